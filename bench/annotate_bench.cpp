@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-constexpr Tick character = 80;  // duration of a character in ticks, at 20 MS/s
+constexpr Tick character = 80;  // duration of a character in samples, at 20 million samples per second
 constexpr Tick turnaround = 60;
 constexpr Tick pause = 64;
 

@@ -35,7 +35,7 @@ constexpr std::uint64_t megabyte = 1'000'000;
 
 struct Cost {
   double time;       // elapsed time in seconds
-  double processor;  // seconds of processor time of all threads and children, independent of other load
+  double processor;  // processor time of all threads and child processes, in seconds; it does not depend on other load
 };
 
 double processor_seconds() {
@@ -97,7 +97,7 @@ class File {
   }
 
  private:
-  // Channel 0 has characters without pauses; the other channels have arbitrary levels.
+  // Writes the capture: channel 0 has characters without pauses, the other channels have arbitrary levels.
   void write() const {
     const int out = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (out < 0) fail("open");
@@ -150,7 +150,8 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Decodes the file and returns the cost. Ends the program if more than 20 characters are wrong or missing.
+// Decodes the file and returns the time that this took. Ends the program if more than 20 characters are wrong or
+// missing.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -165,7 +166,8 @@ Cost decode(const File& file, unsigned threads) {
       return true;
     });
   });
-  // The decoder may mistake edges within the first character of the capture for start bits.
+  // At the begin of the capture, the decoder may take edges within the first character for start bits, so a few
+  // characters may be wrong.
   if (!outcome.problem.empty() || wrong > 20 || count + 20 < file.characters()) {
     std::fprintf(stderr, "%llu of %llu characters, %llu wrong: %s\n", static_cast<unsigned long long>(count),
                  static_cast<unsigned long long>(file.characters()), static_cast<unsigned long long>(wrong),
@@ -175,7 +177,7 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// Reads and sums up the blocks that the decoder reads, and returns the cost.
+// Reads the same blocks as the decoder, only sums them up, and returns the time that this took.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;
@@ -189,11 +191,11 @@ Cost plain_read(const File& file) {
       }
     }
   });
-  if (sum == 1) std::puts("");  // keeps the compiler from omitting the sum
+  if (sum == 1) std::puts("");  // uses the sum, which keeps the compiler from omitting its calculation
   return cost;
 }
 
-// Returns half the time of two decodings at once, the limit of what a second core can give.
+// Returns half the time that two decodings at once take: no decoding with two threads can be faster on this machine.
 double two_independent(const File& file) {
   return cost_of([&] {
            std::jthread other([&] { decode(file, 1); });
@@ -216,7 +218,7 @@ void throughput(bool quick) {
       median(one), median(plain));
 }
 
-// The shortest of many runs counts, because only some runs find both cores free.
+// Measures decoding with two threads. The shortest of many runs counts, because only some runs find both cores free.
 void two_threads(bool quick) {
   const File file(50 * megabyte);
   std::vector<double> alone;
@@ -267,7 +269,7 @@ void compare_file_sizes(bool quick) {
     return;
   }
   const File big(most);
-  plain_read(big);  // fills the page cache as far as possible
+  plain_read(big);  // reads the file, so that as much of it as possible is in the page cache
   std::vector<double> ratios;
   for (int round = 0; round < (quick ? 5 : 7); ++round) {
     double alone = 0;

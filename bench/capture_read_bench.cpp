@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures reading of captures: raw samples against std::fread, sigrok sessions against libzip; VCD and CSV alone.
+// Measures how fast captures are read: raw samples compared with std::fread, sigrok sessions with libzip; VCD and CSV
+// without comparison.
 #include <zip.h>
 
 #include <array>
@@ -26,12 +27,12 @@ void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-// A folder for the run, deleted at its end.
+// The capture files of this run, in a folder that is deleted at the end.
 struct Files {
   Files()
       : folder(std::filesystem::temp_directory_path() / ("absenc-bench-" + std::to_string(std::random_device()()))) {
     std::filesystem::create_directory(folder);
-    // Samples of eight lines, of which one changes about every 32 samples.
+    // Makes samples of eight lines. About every 32 samples one line changes.
     std::mt19937 random(1);
     std::vector<char> samples(samples_size);
     unsigned levels = 0xFF;
@@ -129,7 +130,7 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// The reference of `raw_samples`, without the C library's own buffer.
+// The run with which `raw_samples` is compared. It switches off the buffer of the C library.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();
@@ -154,7 +155,8 @@ void sigrok_session_reference(benchmark::State& state) {
     for (zip_uint64_t i = 2; i < samples_size / piece_size + 2; ++i) {
       zip_file_t* entry = zip_fopen_index(archive, i, 0);
       require_that(zip_fread(entry, buffer.data(), buffer.size()) == static_cast<zip_int64_t>(buffer.size()));
-      require_that(zip_fread(entry, buffer.data(), 1) == 0);  // at the end of the data libzip checks the checksum
+      // reads up to the end of the data, where libzip checks the checksum
+      require_that(zip_fread(entry, buffer.data(), 1) == 0);
       zip_fclose(entry);
       benchmark::DoNotOptimize(buffer.data());
     }

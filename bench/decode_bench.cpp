@@ -19,7 +19,7 @@ namespace {
 using namespace absenc;
 using namespace absenc::tformat;
 
-// Returns different replies, so that the compiler cannot treat one as a constant.
+// Returns many different replies, so that the compiler cannot treat a reply as a constant.
 std::array<ReplyBytes, 64> replies() {
   std::array<ReplyBytes, 64> made;
   for (std::uint32_t i = 0; i < made.size(); ++i) {
@@ -60,7 +60,8 @@ BENCHMARK(tformat_everything_reference);
 template <unsigned bits>
 constexpr biss::Format format_of{.word = biss::word_with_status({.position = bits})};
 
-// Samples of SLO: packed bits, as from an SPI controller, and one byte each, as from a port.
+// Samples of the BiSS data line SLO: as packed bits like those of an SPI controller, and as one byte for each sample
+// like those of a GPIO port.
 constexpr std::size_t samples_size = 96;
 struct Samples {
   std::array<std::uint8_t, samples_size / 8> packed;
@@ -70,7 +71,7 @@ struct Samples {
 
 constexpr unsigned pin = 5;
 
-// Returns frames with different times of ACK and positions.
+// Returns BiSS frames with different durations of ACK and different positions.
 template <unsigned bits>
 std::array<Samples, 64> biss_samples() {
   std::array<Samples, 64> made{};
@@ -120,7 +121,7 @@ void biss_compiled(benchmark::State& state) {
   });
 }
 
-// Decodes with the format as it is: its fields are looked up for each frame.
+// Measures the decoder that does not compile its format: it looks up the fields of the format for each frame.
 template <unsigned bits>
 void biss_any(benchmark::State& state) {
   biss::Format any = format_of<bits>;
@@ -132,7 +133,7 @@ void biss_any(benchmark::State& state) {
   });
 }
 
-// The motor controller's decoder is called, not inlined, so that it decodes any number of bits.
+// The decoder from moteus is called and not inlined, so that it cannot be specialised for one number of bits.
 #if __has_include(<bissc_extract.h>)
 using Peer = moteus::BisscExtractConfig;
 constexpr Peer peer_of(unsigned bits) { return {pin, static_cast<std::uint8_t>(bits), 6, false}; }

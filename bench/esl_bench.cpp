@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures decoding of an ESL safety reply against its two CRCs alone, computed bit by bit.
+// Measures the decoding of an ESL safety reply, compared with the calculation of only its two CRCs bit by bit.
 #include <array>
 
 #include "absenc/protocol/esl/reply.hpp"
@@ -10,7 +10,7 @@ namespace {
 using namespace absenc;
 using namespace absenc::esl;
 
-// Returns different replies, so that the compiler cannot treat one as a constant.
+// Returns many different replies, so that the compiler cannot treat a reply as a constant.
 std::array<ReplyBytes, 64> replies() {
   std::array<ReplyBytes, 64> made;
   for (std::uint32_t i = 0; i < made.size(); ++i) {

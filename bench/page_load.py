@@ -16,7 +16,7 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 10
 UPDATES = float(sys.argv[2]) if len(sys.argv) > 2 else 30
 TICK = os.sysconf("SC_CLK_TCK")
 
-# States are stored as text, so that the measurement includes parsing.
+# The states of the page are stored as text, so that the measurement includes parsing them.
 RECORD = """
 const done = arguments[arguments.length - 1];
 (async () => {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures readings per second over a pseudo-terminal, against bare ppoll, read and write.
+// Measures readings per second over a pseudo-terminal, compared with bare calls of ppoll, read and write.
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
@@ -76,7 +76,7 @@ class Child {
   pid_t pid_;
 };
 
-/// Exchanges by bare system calls; the encoder's side is a child process.
+/// Exchanges requests and replies by bare system calls. A child process is the encoder.
 class BareLoop {
  public:
   BareLoop() : master_(open_raw(nullptr)), child_([this] { answer(); }) {
@@ -103,7 +103,7 @@ class BareLoop {
       wait_readable(master_);
       std::array<std::uint8_t, 64> buffer{};
       const ssize_t count = read(master_, buffer.data(), buffer.size());
-      // Until the host's end of the pseudo-terminal is open, read fails: try again.
+      // While the host's end of the pseudo-terminal is not yet open, `read` fails and is tried again.
       if (count > 0 && write(master_, reply.data(), reply.size()) < 0) _exit(1);
     }
   }
@@ -112,7 +112,7 @@ class BareLoop {
   Child child_;
 };
 
-/// Exchanges through the whole stack; the encoder's side is a child process.
+/// Reads positions through the whole library. A child process is the encoder.
 class Stack {
  public:
   explicit Stack(std::string link)
@@ -198,7 +198,7 @@ int main(int argc, char** argv) {
   double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // The bare runs swap parts, so that neither part always has the run before the stack.
+    // Each measurement of the library is between two bare runs, which swap their roles in every round.
     const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
     const Block second = run(bare, exchanges);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints for each pair of benchmarks NAME and NAME_reference how many times faster NAME is.
+// Compares pairs of benchmarks NAME and NAME_reference: prints how many times faster NAME is.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -12,7 +12,7 @@
 
 namespace absenc::bench {
 
-/// Hides the value of `object` from the compiler; benchmark::DoNotOptimize may change it.
+/// Hides the value of `object` from the compiler. Unlike benchmark::DoNotOptimize, it never changes the object.
 template <class Object>
 void hide(Object& object) {
   asm volatile("" : : "r"(&object) : "memory");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The method of mjbots' moteus for BiSS frames, implemented here only for comparison.
+// The method by which mjbots' moteus decodes BiSS frames, implemented here only for comparison.
 #pragma once
 
 #include <array>
@@ -10,10 +10,10 @@
 
 namespace absenc::bench {
 
-/// Configuration of the motor controller's decoder.
+/// Configuration of the decoder that is compared.
 struct SampledPeer {
   unsigned pin;
-  unsigned bits;  // number of bits of the position, up to 58
+  unsigned bits;  // number of bits of the encoder's position, up to 58
 };
 
 struct SampledPosition {
@@ -40,14 +40,15 @@ constexpr std::uint32_t every_byte = 0x0101'0101;
 
 inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
   std::uint32_t four = 0;
-  __builtin_memcpy(&four, samples, sizeof four);  // a single load instruction, also in a freestanding program
+  // compiled to a single load instruction, also in a freestanding program
+  __builtin_memcpy(&four, samples, sizeof four);
   return four >> pin & every_byte;
 }
 
-// The first byte gives the highest bit.
+// Packs the lowest bits of four bytes into four bits; the bit of the first byte is the highest.
 inline std::uint32_t gathered(std::uint32_t four) { return four * 0x0804'0201 >> 24; }
 
-// Six bits of the data make one step.
+// Returns the CRC of the lower `bits` bits of `data`, in steps of six bits.
 inline unsigned checksum(std::uint64_t data, unsigned bits) {
   unsigned rest = 0;
   const auto step = [&](unsigned shift) { rest = six_bits[(data >> shift & 0x3F) ^ rest]; };
@@ -66,7 +67,8 @@ Register gather(const std::uint8_t* samples, unsigned bits, unsigned pin) {
 
 }  // namespace detail
 
-/// Decodes the frame in `samples`, at least 28, with its start bit among the first 25.
+/// Decodes the BiSS frame in `samples`, of which there are at least 28. The start bit must be among the first 25
+/// samples.
 inline SampledPosition take(const SampledPeer& peer, std::span<const std::uint8_t> samples) {
   using Error = SampledPosition::Error;
   constexpr std::size_t searched = 25;

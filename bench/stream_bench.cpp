@@ -31,8 +31,8 @@ using namespace absenc::raa38;
 using namespace std::chrono_literals;
 
 constexpr std::array<std::size_t, 3> counts{1, 4, 16};
-constexpr std::uint32_t frames_each = 20'000;  // number of frames per port, two seconds of a stream
-constexpr std::uint32_t together = 10;         // number of frames per burst; a burst is sent every millisecond
+constexpr std::uint32_t frames_each = 20'000;  // number of frames on each port: two seconds of a stream
+constexpr std::uint32_t together = 10;         // number of frames that are sent together, every millisecond
 constexpr int rounds = 3;
 
 [[noreturn]] void fail(const char* what) {
@@ -52,7 +52,7 @@ struct Terminal {
   std::string path;
 };
 
-// The position counts the frames, so that a missing one is detected.
+// Sends the frames. Their position is the number of the frame, so that a missing frame is detected.
 void transmit(const std::vector<Terminal>& terminals) {
   const serial::Format format{.bits = 16};
   std::vector<std::vector<std::uint8_t>> unsent(terminals.size());
@@ -102,7 +102,7 @@ Reader read_stream(const std::string& path, std::atomic<std::size_t>& ready, std
   return reader;
 }
 
-/// Returns the processor time of this process per received frame, in microseconds.
+/// Measures streams on `ports` ports. Returns the processor time of this process per received frame, in microseconds.
 double measure(std::size_t ports) {
   const std::vector<Terminal> terminals(ports);
   const pid_t child = ::fork();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the decoding of every unit that has a valid reply vector, against a bitwise CRC.
+// Measures the decoding of every unit that has a valid reply vector, compared with a bitwise CRC of the same bytes.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -34,7 +34,7 @@ Options options_of(const Unit& unit, const Vector& vector) {
   return options;
 }
 
-/// A frame of a vector in the form of its link, with the data that `frame()` refers to.
+/// A frame of a reference vector in the form of its link; it owns the data to which `frame()` refers.
 struct OwnedFrame {
   OwnedFrame(const Unit& unit, Bytes text) : bytes(text.begin(), text.end()) {
     if (carries_bits(unit.link)) {

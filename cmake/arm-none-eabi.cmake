@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The smallest supported core: Cortex-M0+, without the hosted parts of C++.
+# Toolchain for the smallest supported core, Cortex-M0+, with only the freestanding parts of C++.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_CXX_COMPILER arm-none-eabi-g++)

@@ -4,9 +4,10 @@
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
-set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # these follow and override flags of the toolchain
+# these flags follow those of the toolchain and override them
+set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)
 
-# Sources of each machine in firmware/machine, and start addresses of its program and its RAM.
+# For each machine: its sources in firmware/machine, and the start addresses of program and RAM.
 set(microbit_machine cortex_m microbit)
 set(mps2_machine cortex_m mps2)
 set(virt_machine virt)
@@ -14,10 +15,11 @@ set(begin_of_microbit 0 0x20000000)
 set(begin_of_mps2 0 0x20000000)
 set(begin_of_virt 0x80000000 0x80400000)
 
-# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf.
+# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf. ROM and RAM are sizes.
 function(firmware_program name machine rom ram)
   cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
-  string(MAKE_C_IDENTIFIER "firmware_${machine}${one_FLAGS}" machine_objects)  # compiled once per machine and flags
+  # the sources of a machine are compiled once for each set of flags
+  string(MAKE_C_IDENTIFIER "firmware_${machine}${one_FLAGS}" machine_objects)
   if(NOT TARGET ${machine_objects})
     set(machine_sources start machine ${${machine}_machine})
     list(TRANSFORM machine_sources REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/firmware/machine/\\1.cpp")
@@ -42,7 +44,7 @@ function(firmware_program name machine rom ram)
                         RUNTIME_OUTPUT_DIRECTORY "${firmware_folder}")
 endfunction()
 
-# Tables of the reference vectors.
+# Converts the reference vectors (tests/*.json) to tables in C++.
 file(GLOB vector_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/vectors*.json")
 set(vector_tables "${firmware_folder}/reference_vectors.cpp")
 set(vector_script "${PROJECT_SOURCE_DIR}/firmware/vectors.py")
@@ -51,13 +53,14 @@ add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector
                    COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
 set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
 
-if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)  # only this program uses the RISC-V compiler and build tree
+# with the RISC-V compiler, which has a build tree of its own, only this program is built
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)
   firmware_program(vectors-rv32 virt 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
   add_custom_target(firmware-all DEPENDS firmware_vectors-rv32)
   return()
 endif()
 
-# The whole library for a Cortex-M4 with FPU.
+# Builds the whole library for a Cortex-M4 with FPU.
 absenc_sources(m4f_sources ${absenc_firmware_folders})
 add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
 absenc_settings(absenc-m4f)
@@ -67,7 +70,8 @@ target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-# Two programs for the two ends of a T-format line, and two with both ends of a line.
+# drive and encoder are programs for the two ends of a T-format line; the other two have both ends of a line in one
+# program.
 foreach(program IN ITEMS drive encoder cycles_tformat cycles_biss)
   set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
   firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)
@@ -81,8 +85,8 @@ add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microb
 add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f
                   firmware_cycles_tformat-m4f firmware_cycles_biss-m4f)
 
-# Programs that each read one position, or use one part of absenc/host, and a base that does neither, measured by
-# firmware/figures.py. `bounds-...` are the same programs, without the base, with many inputs.
+# Programs that firmware/figures.py measures: each reads one position or uses one part of absenc/host; a base program
+# does neither. `bounds-...` are the same programs, except the base, with many inputs.
 set(reading_sources ${m4f_sources})
 list(FILTER reading_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
 foreach(cpu IN ITEMS m0plus m4f)

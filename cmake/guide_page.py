@@ -5,7 +5,7 @@ import re
 import sys
 from pathlib import Path
 
-NARROWEST = 70  # columns of text that a terminal of 80 has for a page
+NARROWEST = 70  # number of columns that a terminal of 80 columns leaves for the text of a page
 GITHUB_COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 
 
@@ -131,10 +131,11 @@ def body_of(text, page):
             while i < len(lines) and lines[i].strip() and not re.match(r"^(#+ |\||\s*```|\s*(-|\d+\.) )", lines[i]):
                 words.append(lines[i].strip())
                 i += 1
-            if not words:  # a line that only looks like a mark of Markdown
+            if not words:  # the line only looks like a mark of Markdown, so it is taken as text
                 words, i = [line], i + 1
             joined = " ".join(words)
-            if not re.fullmatch(r"(!\[[^\]]*\]\([^)]+\)\s*)+", joined):  # a terminal shows no pictures
+            # a paragraph of only pictures is left out, because a terminal cannot show them
+            if not re.fullmatch(r"(!\[[^\]]*\]\([^)]+\)\s*)+", joined):
                 out += [".PP", line_of(breakable(inline(joined, page), 50))]
     return out
 

@@ -20,7 +20,7 @@ write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersio
 install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATION "${absenc_package_dir}"
         COMPONENT libabsenc-dev)
 
-# Path from the folder of the .pc files to the prefix, so that the installed tree can be moved.
+# The .pc files contain the prefix as a path relative to their folder, so that the installed tree can be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
 set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
@@ -36,7 +36,7 @@ endforeach()
 
 install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
 
-# A program that links the command's tables writes the man page and the bash completion.
+# The man page and the bash completion are written by a program that links the tables of the command.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
   install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
@@ -80,6 +80,7 @@ if(TARGET absenc-command)
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)
-  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")  # stays writable for the user when root installs
+  # creates this file as the user, who can then still write it after root has installed
+  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")
   include(package)
 endif()

@@ -21,7 +21,7 @@ foreach(file IN LISTS python_files)
   configure_file("${file}" "${absenc_python_dir}/${name}" COPYONLY)
 endforeach()
 
-# Debian's folder for Python packages.
+# Installs into the folder that Debian's Python searches for packages.
 if(ABSENC_INSTALL AND NOT ABSENC_SANITIZE)
   install(DIRECTORY "${absenc_python_dir}" DESTINATION lib/python3/dist-packages COMPONENT python3-absenc
           PATTERN __pycache__ EXCLUDE)

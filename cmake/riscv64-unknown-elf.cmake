@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# RV32IMAC. Debian has no C++ library for it, so the headers of ARM's library are used, with picolibc.
+# Toolchain for RV32IMAC. Debian has no C++ library for this target, so it uses the headers of the C++ library for ARM,
+# and picolibc.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR riscv)
 set(CMAKE_CXX_COMPILER riscv64-unknown-elf-g++)

@@ -2,12 +2,12 @@
 # Lists of sources, for this build and for other build systems that use a part of the repository (packages/).
 get_filename_component(absenc_root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
 
-# Folders that need no operating system, and compiler flags that keep firmware small.
+# Folders of the layers that need no operating system, and compiler flags that keep firmware small.
 set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
-# Returns the sources in folders and the given ones, without tests, fuzzers and benchmarks; those in absenc/os/cuse only
-# if that folder is given.
+# Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
+# in absenc/os/cuse are included only if that folder is given.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)
@@ -30,7 +30,7 @@ function(absenc_base result)
   set(${result} absenc/core absenc/link absenc/protocol/author absenc/host ${beside} PARENT_SCOPE)
 endfunction()
 
-# Returns the names of all folders of protocols.
+# Sets `result` to the names of all folders of protocols.
 function(absenc_all_protocols result)
   file(GLOB folders CONFIGURE_DEPENDS LIST_DIRECTORIES true RELATIVE "${absenc_root}/absenc/protocol"
        "${absenc_root}/absenc/protocol/*/")
@@ -38,7 +38,7 @@ function(absenc_all_protocols result)
   set(${result} "${folders}" PARENT_SCOPE)
 endfunction()
 
-# Returns the protocols in the line "Built on:" of a README.md.
+# Sets `result` to the protocols that the README.md of the protocol `name` lists in its line "Built on:".
 function(absenc_built_on result name)
   set(readme "${absenc_root}/absenc/protocol/${name}/README.md")
   set(line)
@@ -51,7 +51,7 @@ function(absenc_built_on result name)
   set(${result} "${others}" PARENT_SCOPE)
 endfunction()
 
-# Returns the folders of protocols of this build, with those that they are built on.
+# Sets `result` to the folders of the protocols that this build contains, and of those on which they are built.
 function(absenc_protocols result)
   absenc_all_protocols(all)
   if(NOT ABSENC_UNITS)
@@ -73,7 +73,7 @@ function(absenc_protocols result)
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()
 
-# Returns the lines of the list of units (protocol/all.cpp) for the units of these folders.
+# Sets `result` to the lines of protocol/all.cpp that list the units of the given folders.
 function(absenc_entries result)
   set(list_of_units "${absenc_root}/absenc/protocol/all.cpp")
   file(READ "${list_of_units}" text)

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 # Unit tests: one executable per layer and per protocol folder. Cross-cutting tests: one executable per file of tests/.
-# A build with only some units (ABSENC_UNITS) has the tests of these, and those for every unit; all others name units.
+# A build with only some units (ABSENC_UNITS) has only the tests of these units and those that test every unit, because
+# all other tests name units.
 find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
 include(GoogleTest)
 
 # Tests with the label `long`: `./dev test` skips them, `./dev test --all` runs them.
 set(absenc_long_python_tests
-    can_peers modbus_peers wave  # use clients, nodes and decoders of other projects
-    doctor_faults doctor_healthy identify speed  # many faults, loaded machines, repetitions on every line
-    docs install mutants_script new_protocol packages python_wheel  # compile, install or configure
-    python python_units record_hdf5  # need mypy, pytest, pandas, matplotlib, h5py
-    serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # need brokers, proxies, full disks
-    serve_browser serve_client serve_look  # need a browser, npm
+    can_peers modbus_peers wave  # these tests run clients, nodes and decoders of other projects
+    # these tests inject many faults, load the machine, or repeat exchanges on every line
+    doctor_faults doctor_healthy identify speed
+    # these tests compile, install or configure the project
+    docs install mutants_script new_protocol packages python_wheel
+    python python_units record_hdf5  # these tests need mypy, pytest, pandas, matplotlib and h5py
+    # these tests need MQTT brokers, HTTP proxies and full disks
+    serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool
+    serve_browser serve_client serve_look  # these tests need a browser and npm
     mqtt_failures_abuse mqtt_packets_abuse mqtt_spool_abuse serve_history_abuse serve_http_abuse)
-# GoogleTest filters of long tests, by the executable. kit: all series of faults but the first.
+# GoogleTest filters of long tests, for each executable. Of the executable kit all series of faults but the first are
+# long.
 set(absenc_long_kit_tests)
 foreach(series RANGE 1 9)
   list(APPEND absenc_long_kit_tests "Seeds/*/${series}_*")
@@ -32,13 +37,13 @@ function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_options(${target} PRIVATE -O0)
-  if(ABSENC_FUZZ)  # coverage of tests is useless for fuzzers, and takes a quarter of the compile time
+  if(ABSENC_FUZZ)  # fuzzers do not use the coverage of tests, which takes a quarter of the compile time
     target_compile_options(${target} PRIVATE -fsanitize-coverage=0)
   endif()
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
 endfunction()
 
-# The path is defined for this test alone: it would make compiler caches useless for others.
+# The path of the sources is defined only for this test, because it would make the compiler cache useless for others.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
@@ -46,7 +51,7 @@ add_library(test_headers OBJECT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
 absenc_test_settings(test_headers)
 target_precompile_headers(test_headers PRIVATE <gtest/gtest.h>)
 
-# All that `./dev test` builds without --all: the command, the Python package, GoogleTest programs, examples.
+# The target for `./dev test` without --all: the command, the Python package, GoogleTest programs, examples.
 add_custom_target(change-tests)
 foreach(target IN ITEMS absenc-command absenc-manual absenc-python)
   if(TARGET ${target})
@@ -59,12 +64,14 @@ function(absenc_test name)
   add_dependencies(change-tests ${name}_test)
   absenc_test_settings(${name}_test)
   set_target_properties(${name}_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
-  if(name STREQUAL "command" OR name STREQUAL "manual")  # compiled with other settings than the precompiled headers
+  # these are compiled with other settings than the precompiled headers, so they cannot use them
+  if(name STREQUAL "command" OR name STREQUAL "manual")
     target_link_libraries(${name}_test PRIVATE absenc-command-objects $<TARGET_NAME_IF_EXISTS:absenc-${name}-objects>)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
-  set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # for tests that compare tables in documents with the code
+  # used by tests that compare tables in documents with the code
+  set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
   set(long "${absenc_long_${name}_tests}")
   if(long)
@@ -75,7 +82,7 @@ function(absenc_test name)
   gtest_discover_tests(${name}_test ${discovery} PROPERTIES ENVIRONMENT "${environment}")
 endfunction()
 
-# Removes from a list of sources those without tests for every unit.
+# Removes from a list of sources all that contain no test for every unit.
 function(absenc_keep_tests_for_every_unit list_of_sources)
   set(kept)
   foreach(source IN LISTS ${list_of_sources})
@@ -87,7 +94,7 @@ function(absenc_keep_tests_for_every_unit list_of_sources)
   set(${list_of_sources} "${kept}" PARENT_SCOPE)
 endfunction()
 
-# ABSENC_SPLIT_TESTS builds one executable per source, because tests/mutants.py runs only some.
+# With ABSENC_SPLIT_TESTS each source becomes an executable, because tests/mutants.py runs only some of them.
 function(absenc_folder_test name folder glob)
   file(${glob} sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*_test.cpp")
   if(ABSENC_UNITS AND NOT folder MATCHES "^absenc/protocol/")
@@ -133,10 +140,10 @@ if(TARGET absenc-client)
   target_sources(client_test PRIVATE tests/kit/frames.cpp)
   target_link_libraries(client_test PRIVATE absenc::client ${hdf5_LIBRARIES})
   target_include_directories(client_test SYSTEM PRIVATE ${hdf5_INCLUDE_DIRS})
-  if(NOT ABSENC_UNITS)  # a program of its own, because it replaces malloc
+  if(NOT ABSENC_UNITS)  # this test is an executable of its own, because it replaces malloc
     absenc_test(reading_allocations tests/reading_allocations.cpp)
     target_link_libraries(reading_allocations_test PRIVATE absenc::client)
-    if(NOT ABSENC_SANITIZE AND NOT ABSENC_FUZZ)  # sanitizers replace malloc themselves
+    if(NOT ABSENC_SANITIZE AND NOT ABSENC_FUZZ)  # not with sanitizers, which replace malloc themselves
       target_compile_definitions(reading_allocations_test PRIVATE ABSENC_COUNTS_MALLOC)
     endif()
   endif()
@@ -159,7 +166,7 @@ list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
 # The kit runs many exchanges, so it is optimised and cannot use the precompiled headers.
 set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
-# Runs fuzz functions as plain tests; in fuzzer builds the fuzzers do that.
+# Builds the fuzz functions as ordinary tests; not in fuzzer builds, where the fuzzers run them.
 if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
   add_library(fuzz_seeds_main OBJECT tests/fuzz_seeds_main.cpp)
   absenc_settings(fuzz_seeds_main)
@@ -182,15 +189,17 @@ if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
     endif()
     target_link_libraries(${target} PRIVATE fuzz_seeds_main absenc::absenc absenc::capture)
     add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
-    set_tests_properties(fuzz_seeds.${stem} PROPERTIES LABELS long TIMEOUT 400)  # about a minute of processor time on an idle machine
+    # such a test takes about a minute of processor time on an idle machine
+    set_tests_properties(fuzz_seeds.${stem} PROPERTIES LABELS long TIMEOUT 400)
   endforeach()
 endif()
 
-# Tests in Python, of the command and of the sources.
+# Tests in Python, which test the command and the sources.
 if(ABSENC_COMMAND AND NOT ABSENC_UNITS)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   file(GLOB python_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.py")
-  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")  # needs the ARM build: ./dev test --all runs it
+  # firmware_test needs the ARM build, so only ./dev test --all runs it
+  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
@@ -200,10 +209,10 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS)
     string(REGEX REPLACE "_test$" "" name "${stem}")
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
-      # Busy time limits are relaxed, because other tests run at the same time.
+      # ABSENC_BUSY_SECONDS relaxes time limits, because other tests run at the same time.
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
-      COST 100  # Python tests start first, because they mostly wait
-      TIMEOUT 900)  # enough for a busy machine
+      COST 100  # Python tests start first, because they mostly wait and leave the processor to others
+      TIMEOUT 900)  # time limit in seconds, long enough for a busy machine
     if(name IN_LIST absenc_long_python_tests)
       set_tests_properties(${name}.py PROPERTIES LABELS long)
       list(REMOVE_ITEM absenc_long_python_tests ${name})
@@ -212,12 +221,13 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS)
   if(PROJECT_IS_TOP_LEVEL AND absenc_long_python_tests AND TARGET absenc-manual)
     message(FATAL_ERROR "No such tests: ${absenc_long_python_tests}")
   endif()
-  # Browser tests, and tests that load the machine on purpose, leave little time for others.
+  # Browser tests and tests that load the machine on purpose count as four processes, because they leave little time for
+  # others.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
   set_tests_properties(speed.py doctor_healthy.py PROPERTIES RUN_SERIAL ON)
 endif()
 
-# Examples end by themselves; their exit status reports success.
+# The examples run as tests: they end by themselves, and their exit status reports success.
 file(GLOB examples CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/examples/*.cpp")
 if(NOT TARGET absenc-client OR ABSENC_UNITS)
   set(examples)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Program for the tests in the virtual machine, in addition to the command. `./dev` builds it before it starts that machine,
-# so it needs no GoogleTest and is not part of the target `all`.
+# A program that tests in the virtual machine use beside the command. `./dev` builds it before it starts the virtual
+# machine, so it needs no GoogleTest and is not part of the target `all`.
 add_executable(vm_can_emulation EXCLUDE_FROM_ALL tests/vm/can_emulation.cpp)
 absenc_settings(vm_can_emulation)
 set_target_properties(vm_can_emulation PROPERTIES OUTPUT_NAME can_emulation

@@ -18,7 +18,7 @@ from command_support import ABSENC, Emulator, end  # noqa: E402
 from serve_support import Server, wait_until  # noqa: E402
 
 PICTURES = os.path.join(HERE, "pictures")
-MINUTE = 62  # seconds until a trace of the last minute is full
+MINUTE = 62  # number of seconds until a trace of the last minute is full
 COLORS = ["#1c2128", "#ff8080", "#58c98c", "#e3b04b", "#7db7f5", "#d2a8ff", "#76d9e0", "#e9edf1"]
 
 
@@ -28,7 +28,8 @@ def picture(name):
 
 def page(browser, folder):
     """The overview with one encoder lost and one with an alarm, and the page of one."""
-    emulator = Emulator(tempfile.gettempdir(), "--motion", "rpm=20", name="press-2")  # the page shows its path
+    # the page shows the path of this port
+    emulator = Emulator(tempfile.gettempdir(), "--motion", "rpm=20", name="press-2")
     path, tokens = os.path.join(folder, "absenc.toml"), os.path.join(folder, "tokens")
     with open(path, "w", encoding="utf-8") as file:
         file.write(config({"press-2": ("tformat", "latency=300"), **KINDS}, {"press-2": emulator.path}))
@@ -48,7 +49,7 @@ def page(browser, folder):
             browser.window(width, height, dark)
             browser.go(server.url, **place)
             wait_until(lambda: browser.ask("return Boolean(document.querySelector('.spark .line[d], .plot canvas'))"), "it is drawn")
-            time.sleep(5)  # of live trace
+            time.sleep(5)  # seconds in which the page draws live readings
             browser.shot(picture(name))
     finally:
         end(server.process)

@@ -29,8 +29,8 @@ def size_of_list(registers):
 class Function:
     def __init__(self, name, address):
         self.name, self.address = name, address
-        self.code = []  # address, mnemonic, operands, comment of objdump
-        self.words = {}  # constants between the instructions
+        self.code = []  # instructions of the function: address, mnemonic, operands and comment, as objdump prints them
+        self.words = {}  # constants that the compiler has placed between the instructions
 
     def frame_change(self, index):
         """Returns by how many bytes the instruction makes the stack deeper."""
@@ -111,8 +111,8 @@ class Graph:
         for site, target in calls:
             self.calls.setdefault(site, set()).add(target)
         self.depths = {}
-        self.indirect = {}  # for each function with indirect calls, their targets
-        self.never_called = set()  # functions with indirect calls that were never made
+        self.indirect = {}  # for each function with indirect calls, the functions that it calls indirectly
+        self.never_called = set()  # functions with indirect calls that were not made in any measurement
 
     def find(self, pattern):
         return [one for one in self.functions.values() if re.search(pattern, one.name)]
@@ -155,7 +155,7 @@ class Graph:
                 literal = TARGET.search(operands) if re.match(rf"(bl|blx|cbn?z|b({CONDITIONS})?)$", name) else None
                 if literal and int(literal[1], 16) in index_of and int(literal[1], 16) != function.address:
                     waiting.append((index_of[int(literal[1], 16)], after))
-                    goes_on = name not in ("b", "bl")  # bl within a function is a far jump
+                    goes_on = name not in ("b", "bl")  # `bl` to a place within the same function is a far jump
                 elif literal:
                     callee = self.functions.get(int(literal[1], 16))
                     if callee and callee.name.startswith("__gnu_thumb1_case"):
@@ -181,7 +181,7 @@ class Graph:
                 if goes_on:
                     waiting.append((index + 1, after))
             missing = [index for index in range(len(function.code)) if index not in reached]
-            # Instructions that nothing else reaches are taken as entries of a jump table.
+            # An instruction that no other one leads to is taken as an entry of a jump table.
             if not missing or not table_depths:
                 return result
             waiting.append((missing[0], table_depths[-1]))

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plugin for QEMU that counts instructions between marks: pairs of functions NAME_begin and NAME_end. Its arguments
 // are NAME_begin=ADDRESS and NAME_end=ADDRESS, and core=m0plus or core=m4f. For the mark `count` the plugin prints each
-// count; for other marks the greatest counts so far of instructions and of cycles, when one rises. Cycles are upper
-// limits. The plugin also prints the targets of each indirect call, each target once. Debian's QEMU lacks the header of
-// plugins, so the functions in use are declared here.
+// count; for other marks it prints the greatest counts of instructions and of cycles so far, whenever one of them
+// rises. The cycles are upper limits. The plugin also prints the targets of each indirect call, each target once.
+// Debian's QEMU lacks the header of plugins, so the functions in use are declared here.
 #include <bit>
 #include <cstdint>
 #include <cstdio>
@@ -44,54 +44,60 @@ struct Cost {
 
 struct Mark {
   std::string name;
-  std::vector<Cost> begins;  // costs at each begin that has no end yet
+  std::vector<Cost> begins;  // counts at each begin of the mark whose end was not yet reached
   Cost greatest;
 };
 
 struct Executed {
   std::uint64_t address;
   unsigned cycles;
-  bool calls;  // calls or jumps to the address in a register
+  bool calls;  // the instruction calls or jumps to an address in a register
 };
 
 bool is_m4f = false;
 Cost cost;
-const Executed* caller = nullptr;  // the last instruction, if it was an indirect call; else null
+const Executed* caller = nullptr;  // last executed instruction if it was an indirect call; otherwise null
 std::map<std::string, Mark> marks;
 std::map<std::uint64_t, Mark*> begin_addresses, end_addresses;
 std::map<std::uint64_t, Executed> executed;
 std::set<std::pair<std::uint64_t, std::uint64_t>> calls;
 
-// Cycles of a taken branch: the Cortex-M4 refills its pipeline in 1 to 3.
+// Returns the cycles of a taken branch. The Cortex-M4 needs 1 to 3 of them to refill its pipeline.
 unsigned branch() { return is_m4f ? 4 : 2; }
 
-// Returns the most cycles of a 16-bit instruction, by the tables of ARM's manuals (DDI 0484, DDI 0439), for memory
-// without wait states and the multiplier of one cycle.
+// Returns the greatest number of cycles that a 16-bit instruction takes, by the tables of ARM's manuals (DDI 0484, DDI
+// 0439), for memory without wait states and a multiplier that takes one cycle.
 unsigned cycles_of_short(unsigned code) {
   const auto registers = static_cast<unsigned>(std::popcount(code & 0xFF));
-  if (code >> 11 == 0b01001 || (code >= 0x5000 && code < 0xA000)) return 2;   // load, store
-  if (code >> 9 == 0b1011010) return 1 + registers + (code >> 8 & 1);         // push
-  if (code >> 8 == 0b10111101) return (is_m4f ? 5 : 4) + registers;           // pop with return
-  if (code >> 8 == 0b10111100 || code >> 12 == 0b1100) return 1 + registers;  // pop, multiple loads and stores
-  if (code >> 12 == 0b1101 || code >> 11 == 0b11100) return branch();         // b
-  if (code >> 8 == 0b01000111) return branch();                               // bx, blx
-  if ((code >> 8 == 0b01000110 || code >> 8 == 0b01000100) && (code & 0x87) == 0x87) return branch();  // to the pc
-  if (code >> 12 == 0b1011 && (code >> 8 & 0b0101) == 0b0001) return branch();                         // cbz, cbnz
+  // instructions that load or store one register
+  if (code >> 11 == 0b01001 || (code >= 0x5000 && code < 0xA000)) return 2;
+  if (code >> 9 == 0b1011010) return 1 + registers + (code >> 8 & 1);  // push instruction
+  if (code >> 8 == 0b10111101) return (is_m4f ? 5 : 4) + registers;    // pop instruction that returns from the function
+  // other pop instructions, and instructions that load or store several registers
+  if (code >> 8 == 0b10111100 || code >> 12 == 0b1100) return 1 + registers;
+  if (code >> 12 == 0b1101 || code >> 11 == 0b11100) return branch();  // b instruction (branch)
+  if (code >> 8 == 0b01000111) return branch();                        // bx and blx instructions
+  // instructions that write the program counter
+  if ((code >> 8 == 0b01000110 || code >> 8 == 0b01000100) && (code & 0x87) == 0x87) return branch();
+  if (code >> 12 == 0b1011 && (code >> 8 & 0b0101) == 0b0001) return branch();  // cbz and cbnz instructions
   return 1;
 }
 
 unsigned cycles_of_long(unsigned first, unsigned second) {
   const auto registers = static_cast<unsigned>(std::popcount(second & 0xFFFF));
-  if (first >> 11 == 0b11110 && (second >> 15) != 0) return is_m4f ? 4 : 3;  // b, bl; barriers and mrs take 3
-  if (first >> 6 == 0b1110100010 || first >> 6 == 0b1110100100) {            // multiple loads and stores
+  // b and bl instructions; the same bits include barriers and mrs, which take 3 cycles
+  if (first >> 11 == 0b11110 && (second >> 15) != 0) return is_m4f ? 4 : 3;
+  if (first >> 6 == 0b1110100010 || first >> 6 == 0b1110100100) {  // instructions that load or store several registers
     return 1 + registers + ((second >> 15) != 0 ? 3 : 0);
   }
-  if (first >> 9 == 0b1110100) return (first & 0xFFF0) == 0xE8D0 ? 6 : 3;                 // tbb, tbh; two registers
-  if (first >> 9 == 0b1111100) return second >> 12 == 15 && (first & 0x10) != 0 ? 5 : 2;  // load (of the pc), store
-  if (first >> 4 == 0xFB9 || first >> 4 == 0xFBB) return 12;                              // division
-  if (first >> 9 == 0b1110110) return 1 + (second & 0xFF);                                // loads and stores of the FPU
-  if (first >> 8 == 0b11101110) return 14;                                                // arithmetic of the FPU
-  return first >> 5 == 0b11111011101 ? 2 : 1;                                             // long multiplication
+  // tbb and tbh instructions, and those that load or store two registers
+  if (first >> 9 == 0b1110100) return (first & 0xFFF0) == 0xE8D0 ? 6 : 3;
+  // instructions that load (perhaps the program counter) or store
+  if (first >> 9 == 0b1111100) return second >> 12 == 15 && (first & 0x10) != 0 ? 5 : 2;
+  if (first >> 4 == 0xFB9 || first >> 4 == 0xFBB) return 12;  // division instructions
+  if (first >> 9 == 0b1110110) return 1 + (second & 0xFF);    // load and store instructions of the FPU
+  if (first >> 8 == 0b11101110) return 14;                    // arithmetic instructions of the FPU
+  return first >> 5 == 0b11111011101 ? 2 : 1;                 // long multiplication instructions
 }
 
 void execute(unsigned, void* data) {
@@ -138,7 +144,8 @@ void translate(Instruction* instruction) {
   std::uint16_t code[2]{};
   std::memcpy(code, qemu_plugin_insn_data(instruction), qemu_plugin_insn_size(instruction));
   const bool is_long = qemu_plugin_insn_size(instruction) == 4;
-  const bool calls_register = !is_long && code[0] >> 8 == 0x47 && (code[0] >> 3 & 15) != 14;  // bx, blx, but not to lr
+  // bx or blx instruction whose target is not in the link register
+  const bool calls_register = !is_long && code[0] >> 8 == 0x47 && (code[0] >> 3 & 15) != 14;
   Executed& one = executed[address];
   one = {address, is_long ? cycles_of_long(code[0], code[1]) : cycles_of_short(code[0]), calls_register};
   qemu_plugin_register_vcpu_insn_exec_cb(instruction, execute, no_registers, &one);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A drive that reads a position in every cycle while commands run beside it, and its encoder, on one machine. A timer
-// stands for the line: it delivers characters, or the bits of a transfer, at the times at which a line would.
+// A drive and its encoder in one program. The drive reads a position in every cycle, and runs commands at the same
+// time. A timer simulates the line: it delivers characters, or the bits of a transfer, at the times at which a line
+// would.
 //
 //   cycles-... CYCLES: number of cycles
 //
@@ -49,10 +50,10 @@ class Random {
 /// rests for a second.
 class AcceleratingShaft final : public Shaft {
  public:
-  static constexpr Time period = 5s;         ///< Duration of one such motion.
-  static constexpr Time begin_of_rest = 4s;  ///< Begin of the rest in each period.
+  static constexpr Time period = 5s;         ///< Duration of one motion: both directions and the rest.
+  static constexpr Time begin_of_rest = 4s;  ///< Time in each period at which the shaft begins to rest.
 
-  /// Returns the position in 2^-32 revolution.
+  /// Returns the position of the shaft at `time`, in 2^-32 revolution.
   [[nodiscard]] static std::int64_t position(Time time) {
     constexpr std::int64_t second = 1'000'000'000;
     const auto phase = static_cast<std::int64_t>(time.count() % period.count());
@@ -64,17 +65,17 @@ class AcceleratingShaft final : public Shaft {
 
  private:
   static constexpr std::int64_t start = (std::int64_t{1000} << 32) + (std::int64_t{1} << 30);
-  // Returns 50 revolutions/s^2 * t^2 in 2^-32 revolution; t is `ns`, which is within 1 s of 0.
+  // Returns the way 50 revolutions/s^2 * t^2 in 2^-32 revolution. The time t is `ns`, from -1 s to 1 s, in nanoseconds.
   [[nodiscard]] static constexpr std::int64_t curve(std::int64_t ns) {
-    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42
+    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42, rounded
     return (ns * ns >> 20) * factor >> 22;
   }
 };
 
-/// Compares cycles with the shaft, and counts them by their kind.
+/// Compares the result of each cycle with the position of the shaft, and counts the cycles of each kind.
 class CycleCheck {
  public:
-  /// `jitter`: greatest time by which the machine may note the time of an event late.
+  /// Makes a check. `jitter`: greatest time by which the machine may note the time of an event too late.
   explicit CycleCheck(Time jitter) : jitter_(jitter) {}
 
   void take(const host::Cycle& cycle, Time next) {
@@ -82,19 +83,20 @@ class CycleCheck {
     longest_stale_ = std::max(longest_stale_, cycle.stale);
     if (cycle.kind != host::Cycle::Kind::fresh) return;
     const Reading& reading = cycle.reading;
-    // The drive does not believe a position that the shaft cannot have reached: checks miss some damage.
+    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached.
     if (!first_.confirms(reading)) {
       ++implausible_;
       return;
     }
     if (!is_near(counts_of(reading), reading, reading.latched, 1, 1)) ++wrong_;
-    constexpr Time longest_gap = 500us;  // longest time between two readings from which the check extrapolates
+    // between readings that are further apart than this, the check does not extrapolate
+    constexpr Time longest_gap = 500us;
     if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
     latched_ = reading.latched;
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
     if (extrapolation_.bits() != reading.singleturn_bits + reading.multiturn_bits) return;
-    // Two readings are known to a count and to the jitter of their times.
+    // An extrapolated position has the errors of two readings, each of a count and of the jitter of its time.
     if (!is_near(extrapolation_.at(next), reading, next, 6, 3)) ++far_;
   }
   [[nodiscard]] bool is_right() const { return wrong_ == 0 && far_ == 0; }
@@ -113,8 +115,8 @@ class CycleCheck {
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
-  // Returns whether the shaft was at `position` at `time`, or between `jitters` jitters before and behind it, give or
-  // take `counts`.
+  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time within `jitters`
+  // jitters of `time`.
   [[nodiscard]] bool is_near(std::uint64_t position, const Reading& reading, Time time, std::int64_t counts,
                              int jitters) const {
     const unsigned bits = reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
@@ -129,13 +131,13 @@ class CycleCheck {
 
   Time jitter_;
   host::Extrapolation extrapolation_{};
-  Time latched_{};  // of the last fresh reading
+  Time latched_{};  // latch time of the last fresh reading
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;
-  std::uint32_t implausible_ = 0;  // fresh cycles whose position is too far from the one before
+  std::uint32_t implausible_ = 0;  // number of fresh cycles whose position is too far from the previous one
   std::uint32_t wrong_ = 0;
-  std::uint32_t far_ = 0;  // extrapolated positions that are too far from the shaft
+  std::uint32_t far_ = 0;  // number of extrapolated positions that are too far from the shaft
 };
 
 /// Handles the events of the line that are due, in the order of time, and sets the alarm of the timer to the next one.
@@ -150,12 +152,12 @@ void run_line(Wire& wire) {
   machine::set_alarm(std::max(next - machine::now(), Time{}));
 }
 
-/// A command beside the cycles, made by the unit.
+/// Runs commands of the unit beside the cycles.
 class ServiceRunner {
  public:
   explicit ServiceRunner(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
 
-  /// Runs the command to its end; `add` queues the service. Returns its error.
+  /// Runs the command `name` to its end and returns its error. `add` queues the service that executes the command.
   template <class Add>
   Error run(std::string_view name, Arguments arguments, bool takes_cycles, const Add& add) {
     auto* const conversation = unit_.host(options_, *find_command(unit_, name), arguments, storage_).bytes;
@@ -181,7 +183,7 @@ class ServiceRunner {
     value_ = value.number;
     return conversation->error();
   }
-  /// Returns the value that the last command reported, -1 if none.
+  /// Returns the value that the last command reported; -1 if it reported none.
   [[nodiscard]] std::int64_t value() const { return value_; }
 
  private:
@@ -191,18 +193,19 @@ class ServiceRunner {
   alignas(std::max_align_t) std::array<std::byte, 3072> storage_;
 };
 
-/// How the two programs differ.
+/// The differences between the programs cycles_tformat and cycles_biss.
 struct Plan {
   std::string_view temperature{};  ///< command that is run every second; "": none
-  std::uint32_t alarm = 0;         ///< alarm that rises in each rest of the shaft; 0: none
+  std::uint32_t alarm = 0;         ///< alarm that the encoder raises in each rest of the shaft; 0: none
   std::string_view clear{};        ///< command that clears the alarm; "": no command is run
-  std::int64_t page = 0;           ///< page of the memory that is written and read
-  std::int64_t addresses = 0;      ///< addresses on each page
-  std::int64_t bytes = 0;          ///< number of bytes that are written and read
-  bool takes_cycles = false;       ///< whether commands may take cycles
+  std::int64_t page = 0;           ///< page of the encoder's memory that is written and read
+  std::int64_t addresses = 0;      ///< number of addresses on each page of the memory
+  std::int64_t bytes = 0;          ///< number of bytes of the encoder's memory that are written and read
+  bool takes_cycles = false;       ///< whether commands may take cycles, in which no position is read
 };
 
-/// Runs commands until `cycles` cycles are over. `Bench` has `axis()`, the CyclicHost, `device()` and `check()`.
+/// Runs commands until `cycles` cycles are over. `Bench` has the members `axis()`, which is the CyclicHost, `device()`
+/// and `check()`.
 template <class Bench>
 bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::uint32_t cycles) {
   const auto add = [&](host::Service<std::uint8_t>& service) { bench.add(service); };
@@ -248,7 +251,7 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     const std::array<std::int64_t, 4> write{address, value, page, 0};
     const std::array<std::int64_t, 3> read{address, page, 1};
     const std::size_t write_count = find_command(bench.unit(), "memory-write")->arguments.size();
-    // A damaged reply may end a command, which is then run again: writing the same byte twice does no harm.
+    // If a damaged reply ends a command, the command is run again: writing the same byte twice does no harm.
     for (unsigned attempt = 0; attempt < 20 && is_running(); ++attempt) {
       if (!run("memory-write", Arguments(write).first(write_count))) continue;
       if (!run("memory-read", read)) continue;

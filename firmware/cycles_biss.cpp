@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C at 5 MHz and 32 kHz: every frame has the position and one bit of the register access that runs beside it.
+// A drive with a BiSS-C encoder, at a clock of 5 MHz and 32 000 cycles per second: every frame has the position and one
+// bit of the register access that runs beside it.
 #include <utility>
 
 #include "absenc/core/bytes.hpp"
@@ -19,7 +20,7 @@ struct Read {
   alignas(biss::ReadPosition) std::byte memory[sizeof(biss::ReadPosition)];
 };
 
-/// The line between drive and encoder: the drive's transfers, whose bits the encoder drives.
+/// The line between drive and encoder: the drive gives the clocks of a transfer, the encoder drives the bits.
 class Bench {
  public:
   Bench(const Options& options, Time begin)
@@ -60,7 +61,7 @@ class Bench {
     Bench& bench;
   };
 
-  // Clocks the bits of a transfer: the encoder decides them at the first edge.
+  // Gives the clocks of a transfer. The encoder decides all its bits at the first clock edge.
   void clock(const ByteStep& step) {
     const Time begin = std::max(step.at, machine::now());
     bits_ = step.bits;

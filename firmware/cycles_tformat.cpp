@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// T-format at 2.5 Mbit/s and 16 kHz: a position with alarms takes 51 us of the 62.5 us of a cycle, so that a command
-// takes a cycle for each of its requests.
+// A drive with a T-format encoder, at 2.5 Mbit/s and 16 000 cycles per second: a position with alarms takes 51 us of
+// the 62.5 us of a cycle, so that a command takes a cycle for each of its requests.
 #include "absenc/core/bytes.hpp"
 #include "absenc/protocol/tformat/host.hpp"
 #include "absenc/protocol/tformat/unit.hpp"
@@ -12,14 +12,15 @@ namespace {
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 constexpr Time period = 62'500ns;
 constexpr Time character = tformat::line_settings.character();
-constexpr Time latency = 11 * character;  // the DMA channel reports a reply when it is complete
+constexpr Time latency = 11 * character;  // the DMA channel reports a reply only when all 11 characters have arrived
 
 struct Read {
   Conversation<std::uint8_t>& operator()() { return *new (memory) tformat::ReadPosition(format); }
   alignas(tformat::ReadPosition) std::byte memory[sizeof(tformat::ReadPosition)];
 };
 
-/// The line between drive and encoder: blocks of both directions, which destroy each other if they overlap.
+/// The line between drive and encoder. It carries blocks of bytes in both directions; blocks that overlap destroy each
+/// other.
 class Bench {
  public:
   Bench(const Options& options, Time begin)
@@ -39,7 +40,7 @@ class Bench {
     run_line(*this);
   }
   [[nodiscard]] Time next() const { return std::min({drive_.due(), encoder_.due(), request_.end, reply_.end}); }
-  // Handles one event due at `time`. The encoder gets `time`, the drive gets the present time.
+  // Handles one event that is due at `time`. The encoder is told `time`, the drive the present time.
   void pass(Time time) {
     now_ = time;
     if (request_.end <= time) {
@@ -72,7 +73,7 @@ class Bench {
   [[nodiscard]] std::uint32_t faults() const { return faults_; }
 
  private:
-  /// Bytes on their way, which a DMA channel delivers when the last one has arrived.
+  /// Bytes on the line, which a DMA channel delivers when the last of them has arrived.
   struct Block {
     void begin(Bytes sent, Time at) {
       bytes.clear();
@@ -128,7 +129,7 @@ class Bench {
   Block request_{};
   Block reply_{};
   bool is_silent_ = false;
-  bool is_disturbed_ = false;  // both sent at the same time
+  bool is_disturbed_ = false;  // drive and encoder have sent at the same time
   Time now_{};
   Random random_{};
   std::uint32_t faults_ = 0;

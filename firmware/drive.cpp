@@ -20,9 +20,9 @@ namespace {
 using machine::print;
 using namespace std::chrono_literals;
 
-constexpr Time period = 500us;  // period of the cycles and of the timer
+constexpr Time period = 500us;  // period of the cycles, and of the timer that begins them
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
-// Highest speed of the axis; low, so that undetected errors of the XOR checksum are implausible.
+// Highest speed of the axis. It is low, so that a position with an error that the XOR checksum misses is implausible.
 constexpr std::uint32_t axis_rpm = 1;
 
 struct Result {
@@ -57,7 +57,7 @@ class Axis {
     ++requests_;
     machine::send(step.out);
   }
-  // On a slow line a reading takes several cycles; all but the last report Error::busy.
+  // On a slow line a reading takes several cycles: all of them but the last report Error::busy.
   void result(bool) {
     const host::Cycle& cycle = cycles_.cycle();
     const bool is_over = cycle.kind != host::Cycle::Kind::repeated && cycle.error != Error::busy;
@@ -104,7 +104,7 @@ class ReadingCheck {
  public:
   ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
 
-  // Sets the alarms that may be reported.
+  // Sets which alarms the encoder may report without failing the check.
   void allow(std::uint32_t alarms) { alarms_ = alarms; }
   void take(const Result& result) {
     if (result.error != Error::none) {
@@ -146,14 +146,14 @@ class ReadingCheck {
   std::uint32_t singleturn_;
   std::uint32_t multiturn_;
   std::uint32_t alarms_ = 0;
-  bool known_ = false;  // the last reading was plausible; the next one must be near it
+  bool known_ = false;  // true: the last reading was plausible, so the next one must be near it
   std::uint32_t good_ = 0;
   std::uint32_t failed_ = 0;
   std::uint32_t implausible_ = 0;
   std::uint32_t wrong_ = 0;
 };
 
-// Takes a result, if there is one; otherwise waits for an interrupt.
+// Checks the next result if there is one; otherwise waits for an interrupt.
 void take_one(ReadingCheck& check) {
   Result result;
   if (axis->take(result)) {

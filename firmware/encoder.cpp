@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A T-format encoder: the device role in the UART's interrupts, on a shaft that stands still or turns evenly.
+// A T-format encoder, which runs in the interrupts of the UART. It measures a shaft that stands still or turns evenly.
 //
 //   encoder SINGLETURN MULTITURN RPM LATENCY_MS: position at the start, speed, and the latency of the
 //   line
@@ -17,7 +17,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The main program reads the clock itself: a tick that the emulator delivers late is lost.
+// The clock's tick is slow because the main program reads the clock itself: a tick that the emulator delivers late
+// would be lost.
 constexpr Time tick_period = 500ms;
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
@@ -26,7 +27,7 @@ class TurningShaft final : public Shaft {
   TurningShaft(std::int64_t position, std::uint32_t rpm) : position_(position), rpm_(rpm) {}
 
   [[nodiscard]] ShaftState at(Time time) const override {
-    constexpr std::uint64_t minute = 60'000'000;  // one minute in microseconds
+    constexpr std::uint64_t minute = 60'000'000;  // number of microseconds in a minute
     const std::uint64_t turned = static_cast<std::uint64_t>(time / 1us) * rpm_;
     const std::uint64_t turns = turned / minute << 32 | (turned % minute << 32) / minute;
     return {.position = position_ + static_cast<std::int64_t>(turns),
@@ -55,7 +56,7 @@ class Encoder {
 
   // ---- Functions called by the carrier
 
-  // The reply is copied, because the device may overwrite its buffer during the reply.
+  // Sends a copy of the reply, because the device may overwrite its buffer while the reply is sent.
   void begin(const ByteStep& step) {
     reply_.clear();
     reply_.append(step.out);
@@ -105,7 +106,7 @@ int main() {
   for (std::uint32_t reported = 0;;) {
     const machine::InterruptLock lock;
     encoder->tick(machine::now());
-    // A busy loop would keep the emulator from serving its socket.
+    // Waits for an interrupt, because a busy loop would keep the emulator from serving its socket.
     if (encoder->is_at_rest()) asm volatile("wfi");
     if (encoder->broken_rules() == reported) continue;
     reported = encoder->broken_rules();

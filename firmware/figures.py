@@ -58,7 +58,8 @@ def run(plugin, program, cpu, *names):
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, text=True, check=False)
     if result.returncode != 0:
         sys.exit(f"{program} read no position: {result.stdout}{result.stderr}")
-    return result.stdout, int(re.search(r"\d+", result.stderr)[0])  # the program's output goes to standard error
+    # the emulated program writes to standard error, so its number is found there
+    return result.stdout, int(re.search(r"\d+", result.stderr)[0])
 
 
 def costs(plugin, program, cpu):
@@ -113,7 +114,7 @@ def measured(folder):
                 return os.path.join(folder, f"{kind}-{reader}-{cpu}.elf")
 
             base = sizes(program("reader", "base")) | costs(plugin, program("reader", "base"), cpu)
-            # The base program reads nothing between its marks: it counts the instructions of the marks.
+            # The base program reads nothing between its marks, so its counts are those of the marks alone.
             base["character"] = base["reply"] = base["reading"]
             for reader in readers:
                 figures = sizes(program("reader", reader)) | costs(plugin, program("reader", reader), cpu)

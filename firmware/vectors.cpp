@@ -13,7 +13,7 @@ namespace {
 
 using machine::print;
 
-// Works without substr(), which may throw.
+// Removes the text before the first `end` from `text` and returns it. It does not use substr(), which may throw.
 std::string_view cut(std::string_view& text, char end) {
   const std::size_t size = std::min(text.find(end), text.size());
   const std::string_view front(text.data(), size);
@@ -31,7 +31,7 @@ bool resolve(const Unit& unit, std::string_view text, Options& options) {
   return resolve_options(unit, {}, settings, options).kind == OptionError::Kind::none;
 }
 
-// Compares decoded fields with a vector of tests/*.json.
+// Compares decoded fields with the fields that a reference vector of tests/*.json expects.
 class ReferenceCheck final : public FieldSink {
  public:
   explicit ReferenceCheck(std::span<const ExpectedField> expected) : expected_(expected) {}
@@ -43,7 +43,7 @@ class ReferenceCheck final : public FieldSink {
       if (!matches(one, value)) wrong_ = true;
     }
   }
-  // Fields that are expected as "" may be missing.
+  // Returns whether all expected fields were decoded; those expected as "" may be missing.
   [[nodiscard]] bool all() const {
     const auto needed = std::count_if(expected_.begin(), expected_.end(), [](const ExpectedField& one) {
       return one.kind != ExpectedField::Kind::text || !one.text.empty();
@@ -103,7 +103,7 @@ class ReferenceCheck final : public FieldSink {
   bool wrong_ = false;
 };
 
-// A frame of a vector, which has bytes, or the text of bits or of a CAN frame.
+// A frame of a reference vector, which is stored as bytes, or as the text of bits or of a CAN frame.
 class VectorFrame {
  public:
   VectorFrame(LinkKind link, Bytes text) : bytes_(text), is_bits_(carries_bits(link)) {

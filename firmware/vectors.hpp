@@ -15,15 +15,15 @@ struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // expected value as a real number, also if it is whole
-  std::string_view text;  // expected flag names separated by blanks, bytes in hexadecimal, or text
+  double real;            // expected value as a real number, set even if the value is whole
+  std::string_view text;  // expected text: names of flags separated by blanks, bytes in hexadecimal, or any other text
 };
 
 struct ReferenceVector {
   std::string_view unit;
   std::string_view id;
   std::string_view options;  // options: "name=value name=value"
-  Bytes request;             // bytes of the request; on clocked and CAN links the bytes of its text
+  Bytes request;             // bytes of the request; on clocked and CAN links the characters of its text
   Bytes reply;
   std::span<const ExpectedField> fields;
   Error error;

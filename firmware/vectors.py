@@ -5,7 +5,8 @@ Writes the vectors as tables for firmware/vectors.cpp."""
 import json
 import sys
 
-TEXT_LINKS = {"biss", "biss-safety", "biss-chain", "ssi", "raa38-can"}  # units whose frames are written as text
+# the vectors of these units contain frames as text
+TEXT_LINKS = {"biss", "biss-safety", "biss-chain", "ssi", "raa38-can"}
 SAME_UNIT = {"biss-control": "biss", "biss-control-request": "biss"}
 
 
@@ -14,7 +15,8 @@ def option_text(value):
 
 
 def options_of(vector):
-    if vector["protocol"] in SAME_UNIT:  # these options describe the vector, not the frame
+    # the options in such a vector describe the vector itself, not the format of its frame
+    if vector["protocol"] in SAME_UNIT:
         return {}
     options = {name: value for name, value in vector["options"].items() if name != "configuration"}
     channels = options.pop("channels", None)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 PLACEHOLDER = "protocol_name"
-# Names of other libraries, test programs and namespaces.
+# Names that a protocol must not have: they belong to other libraries, test programs and namespaces.
 RESERVED = {"absenc", "author", "base", "capture", "client", "command", "core", "cuse", "host", "kit", "link", "manual", "os",
             "protocol", "python", "serve", "sim", "test", "unit", "units"}
 

@@ -27,7 +27,8 @@ struct Layout {
   std::vector<std::string> channels;   // names of the channels; for bytes and frames: of the directions or lines
   std::uint64_t ticks_per_second = 0;  // number of ticks per second; 0: not known
   std::uint64_t ticks = 0;  // length of the capture in ticks; 0: not known before the capture was read to its end
-  // not 0: bytes have arrival times at a program, see Annotator::Settings::gap
+  // shortest pause that the transport did not cause, if bytes have arrival times at a program
+  // (Annotator::Settings::gap); 0: they have times on the line
   Tick arrival_gap = 0;
 };
 
@@ -39,11 +40,11 @@ struct Changes {
 
 /// A character of an asynchronous line.
 struct Character {
-  Tick begin = 0;  // begin of the start bit, as far as known
-  Tick end = 0;    // end of the stop bit, as far as known, or an earlier falling edge behind the stop bit's middle
+  Tick begin = 0;  // tick at which the start bit begins, as far as known
+  Tick end = 0;    // end of the stop bit, as far as known, or an earlier falling edge after the middle of the stop bit
   std::uint8_t value = 0;
-  std::uint8_t channel = 0;  // index among the decoded lines, or in a file of bytes among its channels
-  // Data bits above the eighth, until decode_async makes two characters of a byte each.
+  std::uint8_t channel = 0;  // index of the decoded line, or of the channel in a file of bytes
+  // Data bits above the eighth. Later decode_async splits such a character into two of one byte each.
   std::uint8_t high = 0;
   bool bad_parity = false;
   bool bad_stop = false;  // framing error; with value 0 and a line that stays low it is a break
@@ -56,14 +57,15 @@ struct Burst {
   Tick end = 0;
   std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
-  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
-  // bits may be missing at the beginning or the end
+  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed MSB first, the last byte left-aligned
+  // true: bits of the burst may be missing at its beginning or end
   bool cut = false;
-  // The following members apply to clocked words without chip select.
-  bool low_before = false;   // the clock rested at its low level before the burst
-  bool low_after = false;    // the clock rests at its low level after the burst
-  bool fell_before = false;  // the clock, high behind the previous word, fell during the rest between the two words
-  bool has_last = false;     // `last` is known: the level of the encoder's data line behind the last clock change
+  // The following members are used only for clocked words without chip select.
+  bool low_before = false;  // the clock rested at its low level before the burst
+  bool low_after = false;   // the clock rests at its low level after the burst
+  // the clock was high at the end of the previous word, and fell during the rest between the two words
+  bool fell_before = false;
+  bool has_last = false;  // true: `last` is known
   // level behind the last clock change, where a host with one clock per bit takes its last bit
   bool last = false;
 };
@@ -72,15 +74,15 @@ struct CanRecord {
   Tick at = 0;
   CanFrame frame{};
   bool error_frame = false;  // an error of the bus: `frame` holds class and data of the kernel's error frames
-  std::uint8_t channel = 0;  // index into the layout's channels
+  std::uint8_t channel = 0;  // index of the bus among the channels of the capture
 };
 
 /// A problem in a capture file, with the place in the file.
 struct Damage {
-  std::uint64_t offset = 0;  // bytes from the beginning of the file
-  Tick tick = 0;             // tick up to which data was decoded before the damage
+  std::uint64_t offset = 0;  // place of the problem in the file, in bytes from its beginning
+  Tick tick = 0;             // tick up to which the data was decoded before the damage
   std::string what;          // description of the problem as a sentence; "": none
-  bool note = false;         // true: a remark, e.g. that columns are left out; false: data is bad or missing
+  bool note = false;  // true: only a remark, for example that columns are left out; false: data is bad or missing
 };
 
 /// A part of a capture that is decoded on its own; its storage is used again.
@@ -88,7 +90,7 @@ struct Block {
   std::uint64_t index = 0;  // number of the block: 0, 1, 2 ... in the order of time
   // first tick of the block; after damage it may be later than the end of the previous block
   Tick first = 0;
-  Tick end = 0;                       // tick behind the last tick of the block
+  Tick end = 0;                       // first tick after the block
   std::vector<std::uint8_t> samples;  // samples, `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // size of a sample in bytes: 1, 2, 4 or 8
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel

@@ -12,7 +12,7 @@ namespace absenc {
 
 /// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
-  absent,   ///< the reply does not carry this part
+  absent,   ///< the reply does not contain this part
   unknown,  ///< it is not known whether this part is valid: do not use it
   invalid,  ///< a reported alarm or state marks this part as invalid
   valid,    ///< every alarm and state that could make this part invalid was reported, and is clear
@@ -32,18 +32,20 @@ struct Reading {
   unsigned singleturn_bits = 0;        ///< width of `singleturn` in bits; 0: the reply carries no single-turn position
   unsigned multiturn_bits = 0;         ///< width of `multiturn` in bits; 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  ///< number of valid bits of `singleturn`, counted from the top; 0: do not use it
-  bool multiturn_valid = false;        ///< Whether `multiturn` can be trusted.
-  /// false: it is not known whether `singleturn` is valid, so `singleturn` must not be used
+  bool multiturn_valid = false;        ///< Whether the number of revolutions in `multiturn` can be trusted.
+  /// true: it is known whether `singleturn` is valid; false: it is not, so `singleturn` must not be used
   bool singleturn_known = true;
-  bool multiturn_known = true;  ///< false: it is not known whether `multiturn` is valid
+  bool multiturn_known = true;  ///< true: it is known whether `multiturn` is valid
   /// true: the encoder counts turns below zero, and `multiturn` is in two's complement
   bool multiturn_signed = false;
-  double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
-  bool ready = true;                  ///< false while the encoder reports that it is starting
-  std::uint32_t status = 0;           ///< bits named by the unit's status field, then those of its second status field
-  std::uint32_t alarms = 0;           ///< bits named by the unit's alarms field, then those of its second alarms field
-  std::uint32_t status_reported = 0;  ///< bits of `status` that the encoder reported; the others are unknown, not clear
-  std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that the encoder reported; the others are unknown, not clear
+  double unit_um = 0;        ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
+  bool ready = true;         ///< false: the encoder reports that it is starting
+  std::uint32_t status = 0;  ///< status bits: those of the unit's status field, then those of its second status field
+  std::uint32_t alarms = 0;  ///< alarm bits: those of the unit's alarms field, then those of its second alarms field
+  /// mask of the bits of `status` that the encoder reported; the others are unknown, not clear
+  std::uint32_t status_reported = 0;
+  /// mask of the bits of `alarms` that the encoder reported; the others are unknown, not clear
+  std::uint32_t alarms_reported = 0;
   /// Time for which the position is taken to hold.
   Time latched{};
   Time received{};  ///< time at which the last byte of the reply arrived
@@ -52,7 +54,7 @@ struct Reading {
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
   }
-  /// Returns `valid` if all bits of the single-turn position can be trusted; else why not.
+  /// Returns `valid` if all bits of the single-turn position can be trusted; else the reason why not.
   [[nodiscard]] constexpr Validity singleturn_validity() const {
     if (singleturn_bits == 0) return Validity::absent;
     if (!singleturn_known) return Validity::unknown;
@@ -73,7 +75,8 @@ struct Reading {
 
 /// Returns the angle in degrees, 0 to below 360; a revolution has 2^bits counts, 1 to 64 bits.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // the result for many bits could be rounded up to 360
+  // for many bits the quotient may be rounded up to 360, which is out of range
+  if (bits > 48) return degrees(counts >> (bits - 48), 48);
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
 

@@ -19,7 +19,7 @@ namespace absenc {
 /// A sequence of bits in bytes, the highest bit of each byte first.
 struct BitView {
   Bytes bytes{};         ///< bits, packed with the first bit highest; the last byte is left-aligned
-  std::size_t size = 0;  ///< number of bits, at most eight for each byte
+  std::size_t size = 0;  ///< number of bits in the view, at most eight for each byte
 
   /// Returns the bit at `index`, which is less than `size`.
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
@@ -36,7 +36,7 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Returns the same as `load`, for 1 to 64 bits.
+  /// Returns the same as `load`, but must be called only for 1 to 64 bits.
   [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
     if constexpr (register_bits < 64) return load(first, count);
     const std::uint64_t begin = window(first);
@@ -55,14 +55,15 @@ struct BitView {
   }
 
   static constexpr unsigned register_bits = sizeof(std::size_t) * 8;  ///< Number of bits of a machine word.
-  static constexpr unsigned window_bits = register_bits - 7;          ///< Number of bits that `window` always has.
+  static constexpr unsigned window_bits = register_bits - 7;          ///< Number of bits that `window` always delivers.
 
   /// Returns a word whose top `window_bits` bits are the view's from `first` on; 0 behind the last byte. `first` must
   /// lie within `bytes`.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(bytes.data(), bytes.size(), first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
-    if (std::is_constant_evaluated()) {  // at compile time clang 14 has not instantiated `register_at` yet
+    // when clang 14 evaluates this at compile time, it has not instantiated `register_at` yet
+    if (std::is_constant_evaluated()) {
       std::size_t value = 0;
       for (std::size_t i = 0; i < sizeof(std::size_t); ++i) value = value << 8 | bytes[at + i];
       return value << (first - 8 * at);
@@ -71,13 +72,13 @@ struct BitView {
   }
 
  private:
-  // Has no loop, so that the compiler can emit a single load.
+  // The function has no loop, so that the compiler can emit a single load.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
-  // Takes no view: a call with the address of a view would make the view live in memory.
+  // The function takes no view: a call with the address of a view would force the view into memory.
   [[nodiscard, gnu::noinline]] static constexpr std::size_t short_window(const std::uint8_t* bytes, std::size_t count,
                                                                          std::size_t first) {
     std::size_t value = 0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::array<std::uint8_t, 10> bytes{0x80, 0xFF, 0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xDE, 0xF0};
 
-// Some buffers are shorter than a machine word, and loads reach the end of each buffer.
+// The buffers include some shorter than a machine word, and the loads reach the end of each buffer.
 TEST(BitView, LoadsAnyRunAtAnyPlace) {
   for (std::size_t size = 8; size <= 80; size += 8) {
     const std::vector<std::uint8_t> end(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size / 8));
@@ -60,7 +60,8 @@ TEST(BitView, FindsTheEndOfARun) {
   EXPECT_EQ(bits.end_of_run(1), 8u);
   EXPECT_EQ(bits.end_of_run(3), 8u);
   EXPECT_EQ(bits.end_of_run(8), 16u);
-  EXPECT_EQ(bits.end_of_run(16), 18u);  // not 19: the bits behind the end do not count
+  // the run does not have 19 bits: the bits after the end of the view do not count
+  EXPECT_EQ(bits.end_of_run(16), 18u);
 }
 
 TEST(BitBuffer, ReturnsAppendedBits) {

@@ -30,7 +30,7 @@ class Buffer {
   /// Appends `items`. Returns false, and stores nothing, if they do not all fit.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
-    // Counts in a local copy, because a stored byte may alias `size_`.
+    // The size is counted in a local copy, because the compiler must assume that a stored byte overlaps `size_`.
     std::size_t size = size_;
     for (const Item& item : items) items_[size++] = item;
     size_ = size;

@@ -14,7 +14,7 @@ namespace absenc {
 
 /// Parameters of a CRC. `poly` is in normal notation: x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
-  unsigned width;        ///< width of the checksum in bits, 3 to 16; for BitCrc 0 to 16
+  unsigned width;        ///< width of the checksum in bits: 3 to 16, but 0 to 16 for the class BitCrc
   std::uint16_t poly;    ///< Polynomial of the CRC without its highest term.
   std::uint16_t init;    ///< Value of the register before the first byte.
   bool refin;            ///< Whether each byte is processed lowest bit first.
@@ -43,7 +43,7 @@ struct CrcParameters {
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
-/// Size of the constant table that `Crc` uses.
+/// Sizes of the constant table that `Crc` uses.
 enum class CrcTable {
   byte,    ///< table of 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
   nibble,  ///< table of 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
@@ -96,7 +96,7 @@ class Crc {
     return crc.value();
   }
 
-  /// Size of the look-up table in constant memory, in bytes.
+  /// Size of this CRC's look-up table in constant memory, in bytes.
   static constexpr std::size_t table_bytes = (std::size_t{1} << (table_kind == CrcTable::byte ? 8 : 4)) * sizeof(Word);
 
  private:

@@ -22,7 +22,7 @@ constexpr bool checks(std::uint16_t expected) {
 constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
 constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
 
-// CRCs of supported encoders; (msb): ESL's polynomials without reflection.
+// CRCs of supported encoders; "(msb)" marks polynomials of the ESL protocol without reflection.
 static_assert(checks<CrcParameters{8, 0x01, 0x00, true, true, 0x00}>(0x31), "T-format");
 static_assert(checks<CrcParameters{8, 0x97, 0x00, false, false, 0xFF}>(0x6B), "RLS EncoLink");
 static_assert(checks<biss>(0x2E), "BiSS-C");
@@ -46,7 +46,7 @@ static_assert(Crc<biss>::table_bytes == 256 && Crc<biss, CrcTable::nibble>::tabl
 static_assert(Crc<modbus>::table_bytes == 512 && Crc<modbus, CrcTable::nibble>::table_bytes == 32);
 static_assert(sizeof(Crc<biss>) == 1 && sizeof(Crc<modbus>) == 2, "the state is the remainder alone");
 
-constexpr std::uint64_t mixed(std::uint64_t x) {  // mixes the bits like splitmix64
+constexpr std::uint64_t mixed(std::uint64_t x) {  // mixes the bits of the sample's number as splitmix64 does
   x += 0x9E37'79B9'7F4A'7C15;
   x = (x ^ (x >> 30)) * 0xBF58'476D'1CE4'E5B9;
   x = (x ^ (x >> 27)) * 0x94D0'49BB'1331'11EB;
@@ -59,7 +59,7 @@ constexpr auto noise = [] {
   return bytes;
 }();
 
-// Sample 0 has the polynomial x^width + 1, the others a pseudo-random one.
+// Sample 0 has the polynomial x^width + 1, the others have pseudo-random polynomials.
 constexpr CrcParameters sampled(unsigned width, std::uint64_t sample, bool refin, bool refout) {
   const std::uint64_t bits = mixed(width * 64 + sample);
   const std::uint64_t mask = low_mask(width);
@@ -81,7 +81,7 @@ template <CrcParameters parameters>
 constexpr Engines engines{parameters, [](Bytes bytes) -> std::uint16_t { return Crc<parameters>::of(bytes); },
                           [](Bytes bytes) -> std::uint16_t { return Crc<parameters, CrcTable::nibble>::of(bytes); }};
 
-// A refout different from refin changes only the final step: one sample of each pair is enough.
+// Whether refout differs from refin changes only the final step, so one sample for each pair is enough.
 template <unsigned width>
 constexpr std::array engines_of_width{
     engines<sampled(width, 0, false, false)>, engines<sampled(width, 1, false, false)>,

@@ -21,7 +21,7 @@ constexpr bool steps_by_one_bit(std::uint64_t count) {
 
 TEST(Gray, NeighboursDifferInOneBitAndDecodeIsTheInverse) {
   for (std::uint64_t count = 0; count < 1 << 18; ++count) ASSERT_TRUE(steps_by_one_bit(count)) << count;
-  // The 64 counts up to each carry into a bit from 18 on, and up to the wrap to 0.
+  // Tests the 64 counts before each carry into a bit from 18 on, and before the wrap to 0.
   for (unsigned bits = 18; bits <= 64; ++bits) {
     for (std::uint64_t back = 0; back < 64; ++back) {
       ASSERT_TRUE(steps_by_one_bit(low_mask(bits) - back)) << bits << " bits, " << back << " before the carry";

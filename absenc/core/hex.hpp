@@ -71,7 +71,8 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Bytes, at most 256, of a literal of hexadecimal text: `hex<"1A 00">` has two bytes. Another text does not compile.
+/// Bytes, at most 256, of a literal of hexadecimal text: `hex<"1A 00">` has two bytes. Text that is not hexadecimal
+/// does not compile.
 template <HexLiteral literal>
 requires(detail::is_hex<literal>()) inline constexpr auto hex = detail::hex_bytes<literal>();
 

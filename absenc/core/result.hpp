@@ -87,7 +87,7 @@ class [[nodiscard]] Result {
   constexpr Result(T&& value) : value_(std::move(value)) {}
   /// Makes a failed result that holds `error`, which is not `Error::none`.
   constexpr Result(Error error) : error_(error) {}
-  /// Makes a result that holds the value that `make` returns, which is not moved.
+  /// Makes a result in which the value that `make` returns is constructed, without a move.
   template <class Make>
   requires std::is_same_v<std::invoke_result_t<Make>, T>
   [[gnu::always_inline]] constexpr explicit Result(Make make) : value_(make()) {}

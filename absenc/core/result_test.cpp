@@ -24,7 +24,7 @@ struct Pair {
 };
 static_assert(Result<Pair>(Pair{1, 2})->second == 2);
 
-// The table of error texts is indexed by Error.
+// The table of error texts is indexed by Error, so each entry must stand at the index of its error.
 static_assert(text_of(Error::none).name == "none" && text_of(Error::invalid_argument).name == "invalid_argument");
 static_assert(text_of(Error::timeout).name == "timeout" && text_of(Error::truncated).name == "truncated");
 static_assert(text_of(Error::wrong_length).name == "wrong_length");

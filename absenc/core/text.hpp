@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text functions for firmware, without memchr and exceptions.
+// Text functions for firmware that link neither memchr nor exceptions.
 #pragma once
 
 #include <cstddef>

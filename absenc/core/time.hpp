@@ -2,7 +2,7 @@
 // The type of protocol time: nanoseconds since a start that the caller chooses.
 #pragma once
 
-// libstdc++'s <bits/chrono.h> lacks the calendars and time zones, which are slow to compile.
+// Includes libstdc++'s <bits/chrono.h>, which lacks the calendars and time zones, because those are slow to compile.
 #if __has_include(<bits/chrono.h>)
 #include <bits/chrono.h>
 #else

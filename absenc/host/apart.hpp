@@ -8,10 +8,10 @@
 
 namespace absenc::host {
 
-/// The meaning of `Reading::latched`: the time of the latching, or that of the arrival.
+/// The meaning of `Reading::latched`: the time at which the position was latched, or at which the reply arrived.
 enum class Times : std::uint8_t { latched, arrived };
 
-/// Returns whether this encoder may transmit unsolicited.
+/// Returns whether the encoder with these options may transmit readings without a request.
 [[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
@@ -19,7 +19,7 @@ enum class Times : std::uint8_t { latched, arrived };
 /// Calculates an upper limit of the time between two consecutive readings of one encoder.
 class Apart {
  public:
-  /// `times` is the meaning of the times that are added.
+  /// Makes the calculation. `times` states whether the times of the readings are those of latching or of arrival.
   explicit constexpr Apart(Times times) : times_(times) {}
 
   /// Returns the longest time that can lie between the last added reading and one at `latched`.

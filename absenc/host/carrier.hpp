@@ -19,10 +19,10 @@ namespace absenc::host {
 template <class Item, class Line>
 class Carrier {
  public:
-  /// `latency`: delay of the path to the encoder, which is added to each limit of silence.
+  /// Makes a driver for `line`. `latency`: delay of the path to the encoder, which is added to each limit of silence.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
-  /// Starts the conversation `machine`, which must live until it has ended. Abandons one that still runs.
+  /// Starts the conversation `machine`, which must live until it has ended. Abandons a conversation that still runs.
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
     expected_ = gathered_ = 0;
@@ -52,7 +52,7 @@ class Carrier {
     deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Does what is due at `now`. Call it at `due()`; more calls do no harm.
+  /// Carries out the actions that are due at `now`. Call it at `due()`; further calls do no harm.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -70,30 +70,30 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Takes the machine's steps, after something other than an event has changed what it wants.
+  /// Takes the machine's steps. Call it after something other than an event has changed which step the machine wants.
   void wake(Time now) {
     if (is_busy() && !waiting_ && !sending_) take_steps(now);
   }
-  /// Returns the time at which `tick` must be called, or `never`.
+  /// Returns the next time at which `tick` must be called; `never` if it need not be called.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
   }
-  /// Returns how many silences were reported to machines, for example because a reply was missing.
+  /// Returns how many `silence` events were reported to machines, for example because a reply was missing.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
 
  private:
   using Kind = typename Step<Item>::Kind;
 
   [[nodiscard]] bool has_more_frames() const { return step_.frame != 0 && step_.out.size() > step_.frame; }
-  // Begins the transfer or pulse in `step_`, or the first of its frames.
+  // Begins the stored transfer or pulse; of a transfer in frames, begins its first frame.
   void begin_stored() {
     if (!has_more_frames()) return line_->begin(step_);
     Step<Item> first = step_;
     first.out = step_.out.first(step_.frame);
     line_->begin(first);
   }
-  // Drops the frame of `step_` that was sent; the others wait for the end of the pause.
+  // Removes the frame that was sent from the stored transfer; the other frames wait for the end of the pause.
   void wait_for_frame(Time now) {
     step_.out = step_.out.subspan(step_.frame);
     step_.at = now + step_.width;
@@ -171,17 +171,17 @@ class Carrier {
           answer_ = step.answer;
           gap_ = step.gap;
           at_ = step.at > now ? step.at : never;
-          // Without a gap limit no silence would deliver the gathered characters.
+          // Without a `gap` limit no silence would deliver characters that were gathered, so none are gathered.
           expected_ = gap_ == Time{} ? 0 : static_cast<std::uint8_t>(std::min(step.expect, room));
           return;
       }
     }
   }
 
-  // greatest number of items that are gathered
+  // greatest number of received characters that are gathered
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
-  // Members used for every received character come first, so that short instructions reach them.
+  // Members that are used for every received character come first, so that short instructions can address them.
   std::uint8_t expected_ = 0;  // number of characters to deliver in one piece; below 2: each character at once
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
@@ -189,7 +189,7 @@ class Carrier {
   bool item_received_ = false;  // an item or line error arrived since the last transfer or pulse was sent
   bool silence_reported_ = true;
   Time silent_since_{};
-  std::array<Item, room> items_;  // characters gathered and not yet delivered
+  std::array<Item, room> items_;  // received characters that were gathered and not yet delivered to the machine
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;

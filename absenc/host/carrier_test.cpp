@@ -35,7 +35,7 @@ struct CarrierTest : testing::Test {
 TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   carrier.start(read, 5us);
   EXPECT_EQ(line.sent, std::vector<std::uint8_t>{0x1A});
-  EXPECT_EQ(carrier.due(), never);  // nothing is due until the transfer is sent
+  EXPECT_EQ(carrier.due(), never);  // nothing is due until the line reports that the transfer was sent
   carrier.sent(10us);
   EXPECT_EQ(carrier.due(), 10us + tformat::answer_limit + 1ms);
   Time now = 20us;
@@ -132,7 +132,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
   EXPECT_EQ(fed_by([&](auto& one) {
               one.sent(10ns);
               characters(one, 3, 11ns);
-              one.tick(20ns);  // no action is due at this time
+              one.tick(20ns);  // `tick` has nothing to do at this time
               one.tick(2us);
             }),
             "3 at 13; silence; ");
@@ -166,7 +166,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
             "16 at 26; 4 at 30; ");
 }
 
-// The next conversation gets none of the characters that were gathered for an abandoned one.
+// The next conversation receives no characters that were gathered for an abandoned conversation.
 TEST_F(CarrierTest, DropsGatheredCharactersOfAbandonedConversation) {
   Fed fed;
   carrier.start(fed, 0us);
@@ -208,7 +208,7 @@ TEST_F(CarrierTest, DropsItemsWithoutConversation) {
   EXPECT_EQ(line.results, 0u);
 }
 
-// A machine whose transfer has a time in the future.
+// A machine that requests its transfer for a time in the future.
 struct Later final : Machine<std::uint8_t> {
   void feed(const ByteEvent& event) override { over = event.kind == ByteEvent::Kind::sent; }
   ByteStep next(Time) override {

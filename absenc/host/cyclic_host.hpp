@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position in each cycle of a drive, and other commands in the time between: one machine of many conversations.
+// Reads a position in each cycle of a drive, and runs other commands in the time between: one machine for many
+// conversations.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +15,11 @@ namespace absenc::host {
 template <class Item>
 class Service {
  public:
-  /// How far a service is.
+  /// States of a service.
   enum class State : std::uint8_t {
-    waiting,  ///< not begun
+    waiting,  ///< the conversation has not begun
     running,  ///< the conversation has begun
-    done,     ///< the conversation has ended; its error tells how
+    done,     ///< the conversation has ended; its `error()` tells how
     refused,  ///< a request does not fit between two positions, and the service may not take cycles
   };
 
@@ -29,13 +30,14 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Returns how far the service is.
+  /// Returns the state of the service.
   [[nodiscard]] State state() const { return state_; }
   /// Returns whether the service is done or refused.
   [[nodiscard]] bool is_over() const { return state_ >= State::done; }
-  /// Returns the time that a request refused as too long needs, `never` if unknown; 0 in other cases.
+  /// Returns the time that a refused request needs, `never` if its reply has no known length; 0 if the service was not
+  /// refused.
   [[nodiscard]] Time needs() const { return needs_; }
-  /// Returns the conversation.
+  /// Returns the conversation that executes the service's command.
   [[nodiscard]] Conversation<Item>& conversation() const { return *conversation_; }
 
  private:
@@ -49,14 +51,16 @@ class Service {
   bool takes_cycles_;
 };
 
-/// Times of a CyclicHost.
+/// The times that a CyclicHost keeps, and its line.
 struct CyclePlan {
   Time period{};        ///< time from one cycle to the next
   LineSettings line{};  ///< settings of the line, from which the durations of requests and replies follow
-  Time answer{};        ///< longest time from a request to its reply, if shorter than the protocol's limit; 0: that one
-  Time rest{};          ///< shortest silence between a reply and the next request
-  Time latency{};       ///< delay of the port, the same that its carrier has
-  /// Whether a reply to a service has the position, too, so that services replace the requests of positions.
+  /// longest time from a request to its reply, if shorter than the protocol's limit; 0: the protocol's limit
+  Time answer{};
+  Time rest{};     ///< shortest silence between a reply and the next request
+  Time latency{};  ///< delay of the port, the same as given to the Carrier that runs this machine
+  /// Whether the reply to a service's request also carries the position, so that this request replaces that for the
+  /// position.
   bool carried = false;
 };
 
@@ -65,15 +69,16 @@ struct Cycle {
   /// Kinds of cycles.
   enum class Kind : std::uint8_t {
     fresh,     ///< a valid position was read
-    invalid,   ///< a good reply whose position the encoder marks as not valid, or not ready
+    invalid,   ///< a good reply, but the encoder marks its position as not valid, or itself as not ready
     missing,   ///< no good reply with a position in this cycle
-    repeated,  ///< a service took this cycle
+    repeated,  ///< a service used this cycle, so no position was requested
   };
   Kind kind = Kind::missing;  ///< kind of this cycle
-  Error error = Error::none;  ///< missing: the error of the reading; busy: the reading had not ended
-  Time begun{};               ///< time at which the cycle began
-  Reading reading{};          ///< the last reading of a fresh or invalid cycle
-  std::uint32_t stale = 0;    ///< number of cycles since the last fresh one; 0: this one is fresh
+  /// missing: the error of the reading; `busy` if the reading had not ended when the next cycle began
+  Error error = Error::none;
+  Time begun{};             ///< time at which the cycle began
+  Reading reading{};        ///< the last reading; it is of this cycle if the cycle is fresh or invalid
+  std::uint32_t stale = 0;  ///< number of cycles since the last fresh one; 0: this cycle is fresh
   /// Returns the time from the latch of `reading` to `at`.
   [[nodiscard]] Time age(Time at) const { return at - reading.latched; }
 };
@@ -98,7 +103,7 @@ class CyclicHost final : public Machine<Item> {
   CyclicHost(const CyclicHost&) = delete;
   CyclicHost& operator=(const CyclicHost&) = delete;
 
-  /// Queues a service. It is begun when those before it are over.
+  /// Queues a service. It begins when all services queued before it are done or refused.
   void add(Service<Item>& service) {
     service.next_ = nullptr;
     service.state_ = Service<Item>::State::waiting;
@@ -107,7 +112,7 @@ class CyclicHost final : public Machine<Item> {
   }
   /// Returns the cycle that the last `emit` reported.
   [[nodiscard]] const Cycle& cycle() const { return cycle_; }
-  /// Returns how many items were received while neither a reading nor a service awaited any.
+  /// Returns how many items were received while neither a reading nor a service expected any.
   [[nodiscard]] std::uint32_t unasked() const { return unasked_; }
   /// Moves the next cycle to `at`, for drives whose PWM begins the cycles; Carrier::wake must follow. A cycle that a
   /// carried service has begun ahead stays where it is.
@@ -120,7 +125,7 @@ class CyclicHost final : public Machine<Item> {
   using Kind = typename Step<Item>::Kind;
   using State = typename Service<Item>::State;
   static constexpr bool is_can = sizeof(Item) != 1;
-  /// Whose exchange is on the line.
+  /// Whose exchange is on the line: the reading's, a service's, or none.
   enum class User : std::uint8_t { nobody, position, service };
 
   void begin_cycle();
@@ -135,7 +140,7 @@ class CyclicHost final : public Machine<Item> {
   void end_service(State state);
   void begin_transfer(Step<Item>& step);
   void limit(Step<Item>& step, Time now) const;
-  // Returns whether the position of the next cycle may come with the service's reply.
+  // Returns whether the position of the next cycle may come with the reply to the service's request.
   [[nodiscard]] bool may_carry() const {
     const bool is_alone = is_row_ || step_.holds_line;
     const bool fits = step_.kind != Kind::configure && step_.at < due_ && transfer_time(step_) < plan_.period;
@@ -148,23 +153,24 @@ class CyclicHost final : public Machine<Item> {
   CyclePlan plan_;
   Time due_;  // begin of the next cycle
   Cycle cycle_{};
-  Conversation<Item>* position_ = nullptr;  // reading that has not ended
-  Service<Item>* service_ = nullptr;        // first of the queue
+  Conversation<Item>* position_ = nullptr;  // conversation that reads the position; null: none runs
+  Service<Item>* service_ = nullptr;        // first service of the queue
   Service<Item>* last_ = nullptr;
-  Step<Item> step_{};        // transfer, pulse or change of the rate that the service wants, if `wants_`
-  Time wake_ = Time::min();  // time at which the service wants to continue, if not `wants_`
-  Time rested_at_{};         // earliest time of a service's request
-  Time free_since_ = never;  // end of the last reading
+  // transfer, pulse or change of the bit rate that the service wants to begin next, if there is one
+  Step<Item> step_{};
+  Time wake_ = Time::min();  // time at which the service wants to continue, if it has no step to begin
+  Time rested_at_{};         // earliest time at which a service may send its request
+  Time free_since_ = never;  // time at which the last reading ended
   std::uint32_t unasked_ = 0;
   User user_ = User::nobody;
   bool wants_ = false;
-  bool is_row_ = false;       // no position may be requested before the service's next request
-  bool is_too_long_ = false;  // `step_` did not fit behind a position
-  bool takes_ = false;        // the running cycle belongs to the service
+  bool is_row_ = false;       // no position may be requested before the service has sent its next request
+  bool is_too_long_ = false;  // the service's next request did not fit between two positions
+  bool takes_ = false;        // the running cycle belongs to the service, so that no position is read
   bool carries_ = false;      // the position of the running cycle comes with the service's reply
-  bool is_concluded_ = true;  // the running cycle was emitted
+  bool is_concluded_ = true;  // the result of the running cycle was emitted
   bool emitting_ = false;
-  bool in_transfer_ = false;    // the transfer has not ended
+  bool in_transfer_ = false;    // the transfer on the line has not ended
   bool ends_by_items_ = false;  // the transfer ends when its items are received: on SPI and clocked links
 };
 
@@ -178,7 +184,7 @@ void CyclicHost<Item, Read>::feed(const Event<Item>& event) {
   }
   if (event.kind == (ends_by_items_ ? Of::received : Of::sent)) in_transfer_ = false;
   if (user_ == User::nobody) unasked_ += static_cast<std::uint32_t>(event.items.size());
-  // On CAN identifiers tell whose a frame is.
+  // Both conversations get every CAN frame, because they recognise theirs by its identifier.
   const bool is_for_both = is_can && event.kind == Of::received;
   if (user_ == User::position || (is_for_both && position_ != nullptr)) position_->feed(event);
   const bool is_running = service_ != nullptr && service_->state_ == State::running;
@@ -200,7 +206,7 @@ Step<Item> CyclicHost<Item, Read>::next(Time now) {
       if (is_concluded_) {
         begin_cycle();
       } else {
-        conclude(Cycle::Kind::missing, Error::busy);  // the reading takes longer than a cycle
+        conclude(Cycle::Kind::missing, Error::busy);  // the reading took longer than a cycle
       }
     } else if (user_ == User::service) {
       if (continue_service(step, now)) return step;
@@ -208,7 +214,7 @@ Step<Item> CyclicHost<Item, Read>::next(Time now) {
       if (continue_position(step, now)) return step;
     } else {
       run_service(now);
-      if (user_ == User::service) continue;  // it listens
+      if (user_ == User::service) continue;  // the service only listens, and uses the line now
       if (begin_service(step, now)) return step;
       const Time service_due = service_ == nullptr ? never : wants_ ? step_.at : wake_;
       return {.at = service_due > now ? std::min(due_, service_due) : due_};
@@ -244,7 +250,7 @@ void CyclicHost<Item, Read>::conclude(Cycle::Kind kind, Error error) {
 
 // ---- Positions
 
-// Returns whether `step` is to be taken.
+// Sets `step` to the next step of the reading. Returns false if it is no step for the port, but a result or the end.
 template <class Item, class Read>
 bool CyclicHost<Item, Read>::continue_position(Step<Item>& step, Time now) {
   step = position_->next(now);
@@ -287,18 +293,19 @@ void CyclicHost<Item, Read>::conclude_with(const Reading& reading) {
 
 // ---- Services
 
-// Lets the service decide what it wants, while it does not use the line.
+// Asks the service for its next step, while it does not use the line.
 template <class Item, class Read>
 void CyclicHost<Item, Read>::run_service(Time now) {
   while (service_ != nullptr && user_ == User::nobody && !wants_ && now >= wake_) {
     service_->state_ = State::running;
     take_service_step(service_->conversation_->next(now), now);
   }
-  // The next cycle begins early, because a clock line that is held low in the pause is a bit for the encoder.
+  // The cycle of a carried service begins before its time, because a clock line that is held low in the pause is a bit
+  // for the encoder.
   if (user_ == User::nobody && !carries_ && may_carry()) begin_cycle();
 }
 
-// Returns whether the service still uses the line; `step` is the step to be taken then.
+// Returns whether the service still uses the line; if so, sets `step` to its next step.
 template <class Item, class Read>
 bool CyclicHost<Item, Read>::continue_service(Step<Item>& step, Time now) {
   step = service_->conversation_->next(now);
@@ -340,7 +347,7 @@ void CyclicHost<Item, Read>::take_service_step(const Step<Item>& step, Time now)
   }
 }
 
-// Returns whether the step that the service wants begins now; `step` is that step then.
+// Returns whether the step that the service wants begins now; if so, sets `step` to it.
 template <class Item, class Read>
 bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   if (!wants_) return false;
@@ -348,7 +355,7 @@ bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   if (carries_) start = std::max(start, cycle_.begun);
   const bool fits = step_.kind == Kind::configure || duration(step_) <= due_ - start;
   if (!fits && !is_row_ && !takes_ && !carries_) {
-    // It is too long if only the position was in its way.
+    // The request is too long if nothing but the position kept it from being sent.
     is_too_long_ = is_too_long_ || (now == free_since_ && step_.at <= std::max(now, rested_at_));
     if (is_too_long_ && !service_->takes_cycles_) {
       service_->needs_ = duration(step_);
@@ -387,7 +394,7 @@ void CyclicHost<Item, Read>::begin_transfer(Step<Item>& step) {
   ends_by_items_ = step.answer == Time{} && step.gap == Time{} && step.expect != 0;
 }
 
-// Limits a wait to the answer of the plan and the begin of the next cycle.
+// Limits the wait in `step` to the plan's time for an answer, and to the begin of the next cycle.
 template <class Item, class Read>
 void CyclicHost<Item, Read>::limit(Step<Item>& step, Time now) const {
   if (plan_.answer != Time{}) step.answer = std::min(step.answer, plan_.answer);
@@ -401,7 +408,8 @@ Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
   if (step.kind == Kind::pulse) return step.width;
   if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
   if constexpr (is_can) {
-    constexpr unsigned longest_frame = 160;  // bits of an extended CAN frame of 8 bytes with stuff bits
+    // number of bits of an extended CAN frame with 8 data bytes, with stuff bits
+    constexpr unsigned longest_frame = 160;
     return line.bits(longest_frame * (step.out.size() + step.expect));
   } else {
     if (step.answer == Time{} && step.expect != 0) {  // SPI

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine on a port: the loop of programs that may wait.
+// Runs a machine on a port: the loop for programs that may block while they wait.
 #pragma once
 
 #include "absenc/link/port.hpp"
@@ -10,7 +10,7 @@ namespace absenc::host {
 /// done. Exceptions pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
-  // Between two events the clock is not read: that would cost time and gain nothing.
+  // The time of an event serves until the next event, because reading the clock takes time.
   for (Time now = port.now();;) {
     const Step<Item> step = machine.next(now);
     switch (step.kind) {
@@ -40,9 +40,9 @@ void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {
     Step<Item> step = machine.next(now);
     if (step.kind == Step<Item>::Kind::emit) continue;
-    if (step.kind != Step<Item>::Kind::wait) return;  // a machine that is done returns `done` again to `drive`
+    if (step.kind != Step<Item>::Kind::wait) return;  // the machine is done, and will return `done` again to `drive`
     const Time due = step.at;
-    // A port delivers items that have already arrived before it reports the timer at this time.
+    // A timer 1 ns ahead ends the wait only after the port has delivered all items that have already arrived.
     step.at = port.now() + Time{1};
     const Event<Item> event = port.wait(step);
     now = event.at;

@@ -24,7 +24,7 @@ ByteStep EchoFilter::next(Time now) {
     sent_.clear();
     held_.clear();
     echoed_ = 0;
-    // The request is longer than any request of a supported protocol: its echo is not removed.
+    // A request that does not fit is longer than any request of a supported protocol: its echo is not removed.
     if (!sent_.append(step.out)) return step;
     reply_due_ = step.expect;
     echo_due_ = working_mode() == EchoMode::on ? sent_.size() : 0;
@@ -35,7 +35,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // The encoder may still take its answer time: the gap limit must not be shorter.
+  // Before the reply begins, the encoder may still use its answer time: the `gap` limit must not be shorter.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }
@@ -52,7 +52,7 @@ void EchoFilter::feed(const ByteEvent& event) {
 }
 
 void EchoFilter::received(const ByteEvent& event) {
-  if (sent_.empty()) return inner_->feed(event);  // no request is stored whose echo could arrive
+  if (sent_.empty()) return inner_->feed(event);  // no request is stored, so no echo can arrive
   switch (working_mode()) {
     case EchoMode::off:
       inner_->feed(event);
@@ -110,7 +110,7 @@ void EchoFilter::decide(Time at) {
   }
   detected_ = EchoMode::off;
   if (!has_no_echo) return pass(at, bytes);
-  // Bytes after the length of the reply do not belong to it, so they are passed separately.
+  // Bytes beyond the length of the reply do not belong to it, so they are passed on separately.
   pass(at, bytes.first(reply));
   pass(at, bytes.subspan(reply));
 }

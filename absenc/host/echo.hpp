@@ -10,7 +10,7 @@
 
 namespace absenc::host {
 
-/// Setting for the echo of an adapter: whether it receives the bytes that it sends.
+/// Whether the adapter echoes, which means that it receives the bytes that it sends.
 enum class EchoMode : std::uint8_t {
   automatic,  ///< the first good exchange with a request shows whether the adapter echoes
   on,
@@ -34,7 +34,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
     sent_.clear();
     held_.clear();
   }
-  /// Ends the exchange; `good`: without an error. Only a good one makes the detected mode final.
+  /// Ends the exchange; `good`: without an error. Only a good exchange makes the detected echo mode final.
   void conclude(bool good);
 
   /// Processes an event that the port reports.
@@ -63,14 +63,14 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation; automatic: not yet
+  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation; automatic: not detected yet
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
-  ByteBuffer<capacity> held_;  // automatic mode: received bytes that may be the echo
+  ByteBuffer<capacity> held_;  // automatic mode: received bytes, stored because they may be the echo
   std::size_t echo_due_ = 0;   // mode on: number of echo bytes still to be received
   std::size_t echoed_ = 0;     // number of echo bytes received after the last request
   std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects; 0: unknown
-  bool passed_ = false;        // bytes of the reply were passed to the conversation
+  bool passed_ = false;        // bytes of the reply have been passed to the conversation
   bool only_echo_ = false;
 };
 

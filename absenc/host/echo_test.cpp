@@ -25,7 +25,7 @@ TEST_P(Echo, IsRemovedByCount) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
   }
-  // This command reads memory and selects pages; the reply to a page select equals its request.
+  // The temperature command reads memory and selects pages; the reply to a page select equals its request.
   const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
   EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
 }
@@ -100,7 +100,7 @@ TEST(EchoFilter, DetectsDisturbedEcho) {
 }
 
 TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
-  Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
+  Bench port_like(EchoMode::on);  // as on a real port, the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);
   auto* read = port_like.unit.host(port_like.options, *find_command(port_like.unit, Verb::read), {}, storage).bytes;
   EchoFilter filter(EchoMode::on);
@@ -120,7 +120,7 @@ TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
   }
 }
 
-// The reply to a page select equals its request, so it has as many bytes.
+// The reply to a page select has as many bytes as its request, and equals it.
 TEST(EchoFilter, ReplyEqualToRequestIsNoLoneEcho) {
   Bench bench(EchoMode::automatic);
   EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::temperature))->error(), Error::none);

@@ -15,8 +15,8 @@ namespace absenc::host {
 /// by the noise of the readings times 1 + 2 * ahead / span; `span` is the time between the two readings.
 class Extrapolation {
  public:
-  /// Adds a reading. Ignores one that is not ready, not valid or wider than 63 bits; starts again at one of another
-  /// width, or not latched later.
+  /// Adds a reading. Ignores a reading that is not ready, not valid or wider than 63 bits. Forgets the earlier ones if
+  /// the width differs or `reading` was not latched later.
   constexpr void add(const Reading& reading) {
     if (!reading.ready || !reading.singleturn_valid()) return;
     const unsigned turn_bits = reading.multiturn_valid ? reading.multiturn_bits : 0;
@@ -36,7 +36,8 @@ class Extrapolation {
 
   /// Returns whether two readings are known.
   [[nodiscard]] constexpr bool valid() const { return bits_ != 0 && span_ > Time{}; }
-  /// Returns the width of `at` in bits: the single-turn bits and, if they are valid, those of the turns.
+  /// Returns the width in bits of the positions that `at` returns: single-turn bits and, if they are valid, those of
+  /// the turns.
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
   /// Returns the position at `time`, the turns above the single-turn counts, as the encoder would count it. Call it
   /// only while `valid()` is true.
@@ -47,7 +48,8 @@ class Extrapolation {
  private:
   static constexpr unsigned most_bits = 63;
 
-  // Returns step_ * ahead / span_ modulo 2^64, rounded towards zero, with times that are halved until the product fits.
+  // Returns the movement in the time `ahead`: step_ * ahead / span_ modulo 2^64, rounded towards zero. Both times are
+  // halved until the product fits.
   [[nodiscard]] constexpr std::uint64_t moved(Time ahead) const {
     constexpr std::int64_t most = std::int64_t{1} << 31;
     std::int64_t time = ahead.count();
@@ -62,10 +64,10 @@ class Extrapolation {
   }
 
   std::uint64_t position_ = 0;
-  std::int64_t step_ = 0;  // counts from the second last reading to the last one
-  Time span_{};            // time between these
+  std::int64_t step_ = 0;  // distance in counts from the second last reading to the last one
+  Time span_{};            // time from the second last reading to the last one
   Time latched_{};
-  unsigned bits_ = 0;  // 0: no reading is known
+  unsigned bits_ = 0;  // width of the last position in bits; 0: no reading is known
 };
 
 }  // namespace absenc::host

@@ -47,11 +47,11 @@ TEST(Extrapolation, WrapsAsTheEncoderDoes) {
   EXPECT_EQ(one.at(Time(3000)), 0xFFD0u);
 }
 
-// A motion with constant acceleration, whose error the class states.
+// The motion has constant acceleration, for which the class states its greatest error.
 RC_GTEST_PROP(ExtrapolationProperty, KeepsItsStatedError, ()) {
   const auto bits = *rc::gen::inRange(10u, 33u);
-  const double speed = *rc::gen::inRange(-200, 201);           // revolutions/s
-  const double acceleration = *rc::gen::inRange(-1000, 1001);  // revolutions/s^2
+  const double speed = *rc::gen::inRange(-200, 201);           // speed in revolutions/s
+  const double acceleration = *rc::gen::inRange(-1000, 1001);  // acceleration in revolutions/s^2
   const auto span = *rc::gen::inRange<std::int64_t>(10'000, 1'000'000);
   const auto ahead = *rc::gen::inRange<std::int64_t>(0, 1'000'000);
   const double turn = std::ldexp(1.0, static_cast<int>(bits));

@@ -10,7 +10,7 @@
 
 namespace absenc::host {
 
-/// A check that compares each position with the one before, by the highest speed of the shaft.
+/// A check that compares each position with the previous one, using the highest speed of the shaft.
 class FirstReading {
  public:
   /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: the default of `SpeedLimit`.
@@ -25,7 +25,7 @@ class FirstReading {
     has_step_ = false;
   }
 
-  /// Returns `is_near(reading)`, then calls `keep(reading)`.
+  /// Returns `is_near(reading)`, and stores the position of `reading` for the next comparison.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
@@ -63,7 +63,7 @@ class FirstReading {
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);
   }
 
-  /// Stores the position of `reading`, or that it has none, for the next comparison.
+  /// Stores the position of `reading` for the next comparison, or the fact that `reading` has none.
   constexpr void keep(const Reading& reading) {
     const Place place = place_of(reading);
     has_step_ = is_like_last(place);
@@ -73,10 +73,10 @@ class FirstReading {
   }
 
  private:
-  // A position in counts, with the turns if they are valid and fit in 64 bits together with it.
+  // A position in counts, which includes the turns if they are valid and both fit in 64 bits.
   struct Place {
     std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  // number of bits of `counts`; 0: no position
+    std::uint8_t bits = 0;  // number of bits of `counts`; 0: there is no position
     std::uint8_t singleturn_bits = 0;
   };
 
@@ -117,7 +117,7 @@ class FirstReading {
   Reach reach_;
   Place last_{};
   bool has_step_ = false;
-  std::uint64_t step_ = 0;  // counts from the second last position to the last one
+  std::uint64_t step_ = 0;  // distance in counts from the second last position to the last one
   Time latched_{};
 };
 

@@ -27,7 +27,7 @@ constexpr bool agree(FirstReading first, const Reading& one, const Reading& othe
 }
 
 TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
-  // 6000 rpm are 100 turns a second: 13 107 counts in 1 ms.
+  // 6000 rpm are 100 turns a second: 13 107 counts of 17 bits in 1 ms.
   const auto confirmed = [](std::uint64_t singleturn, std::uint64_t multiturn) {
     return agree(FirstReading(6000), reading_at(0, 0, {}), reading_at(singleturn, multiturn, 1ms));
   };
@@ -68,7 +68,7 @@ TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
 }
 
 TEST(FirstReading, RefusesMuchFasterShaft) {
-  // Counts of 13 bits: 819 are allowed in 1 ms, and four times as many at the third position.
+  // The counts have 13 bits. In 1 ms 819 counts are allowed, and four times as many at the third position.
   for (const std::uint64_t step : {1638u, 3276u, 3500u}) {
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
@@ -104,7 +104,7 @@ TEST(FirstReading, TakesPositionsOf64Bits) {
 }
 
 TEST(FirstReading, UsesSpeedOfCarriage) {
-  // 1 m/s: 1000 counts of 1 um in a millisecond.
+  // A carriage at 1 m/s moves 1000 counts of 1 um in a millisecond.
   const FirstReading first(Reach::of({.mm_s = 1000}, {.singleturn_bits = 26, .multiturn_bits = 0, .unit_um = 1}));
   EXPECT_TRUE(agree(first, of_bits(26, 0, {}), of_bits(26, 1004, 1ms)));
   EXPECT_FALSE(agree(first, of_bits(26, 0, {}), of_bits(26, 1006, 1ms)));

@@ -19,7 +19,8 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Runs `conversation`; returns whether it ended, or gave a result if it `asks`, within `limit`.
+  /// Runs `conversation`; returns whether it ended within `limit`. A conversation with `asks()` need only emit a
+  /// result.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;
@@ -49,7 +50,7 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Returns the number of injected faults of the kinds that change bytes.
+/// Returns the number of injected faults that change bytes, of all such kinds.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -73,7 +73,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// The integer arithmetic of Reach rounds up by at most 2^-29.
+// The integer arithmetic of Reach rounds a distance up by at most 2^-29 of its value.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
@@ -128,7 +128,7 @@ RC_GTEST_PROP(UnwrapProperty, JoinsWithinTheLongestGap, ()) {
   if (longest < 0x1p57) RC_ASSERT(!joins(longest * (1 + 0x1p-27) + 2));
 }
 
-// The jumps of the calculation with floating point, which the integers must find.
+// The integers must find the same jumps as the calculation with floating point.
 RC_GTEST_PROP(UnwrapProperty, JumpsFromFourTimesTheSpeedLimitOn, ()) {
   const auto bits = *rc::gen::inRange(8u, 64u);
   const auto speed = static_cast<std::uint32_t>(any_number(32));
@@ -168,9 +168,9 @@ void expect_same_speed(const Velocity& velocity) {
     RC_ASSERT(std::abs(real) + real_around >= 0x1p63 * (1 - 0x1p-29));
     return;
   }
-  constexpr double exact = 1e-14;  // rounding of the real numbers
+  constexpr double exact = 1e-14;  // relative rounding error of the calculation with floating point
   const double greatest = std::abs(real) + real_around;
-  // The interval of the integers contains that of the real numbers.
+  // The interval computed with integers contains the interval computed with floating point.
   RC_ASSERT(whole - around <= real - real_around + greatest * exact);
   RC_ASSERT(whole + around >= real + real_around - greatest * exact);
   RC_ASSERT(std::abs(whole - real) <= greatest * 0x1p-29 + 2);
@@ -202,7 +202,7 @@ RC_GTEST_PROP(VelocityProperty, IntegersEqualRealNumbersInOneWindow, ()) {
 }
 
 RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {
-  // Speed in counts/s, acceleration in counts/s^2; each reading is late by up to half a period.
+  // Speed is in counts/s, acceleration in counts/s^2; each reading is late by up to half a period.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
@@ -226,7 +226,8 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
-  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts/s at half a turn per reading
+  // speed in counts/s at which the shaft moves half a turn per reading
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);
   const auto measured = [&](double speed) {
     Unwrapper unwrapper(SpeedLimit{.rpm = 0});
     Velocity velocity;
@@ -240,7 +241,7 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   const double share = *rc::gen::inRange(-999, 1000) / 1000.0;
   const double count = 1e9 / static_cast<double>(period);
   RC_ASSERT(std::abs(measured(share * limit) - share * limit) <= count);
-  // Between the limit and twice the limit the shaft seems to turn in the opposite direction.
+  // Between one and two times the speed of half a turn per reading, the shaft seems to turn in the opposite direction.
   const double above = *rc::gen::inRange(1001, 2000) / 1000.0;
   RC_ASSERT(std::abs(measured(above * limit) - (above - 2) * limit) <= count);
 }

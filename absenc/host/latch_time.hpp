@@ -18,7 +18,7 @@ struct LatchTime {
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 
-/// Returns the latch interval by the times of `reading` alone.
+/// Returns the latch interval that follows from the times in `reading` alone.
 [[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
   return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
 }

@@ -84,7 +84,7 @@ void OutstandingRequests<Item>::mark_lost(Items request, Time longest) {
   entry->sent_at.clear();
 }
 
-// Removes lost requests first: a late reply may belong to one of them.
+// Removes a lost request of `entry` first, because a late reply may belong to it.
 template <class Item>
 void OutstandingRequests<Item>::remove_oldest(Entry& entry) {
   if (entry.lost != 0) {

@@ -17,10 +17,11 @@ namespace absenc::host {
 template <class Item>
 class OutstandingRequests {
  public:
-  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
+  /// Whether the items are CAN frames; otherwise they are bytes.
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
   /// Items of a request: at most 16 bytes or one CAN frame.
   using Request = Buffer<Item, is_can ? 1 : 16>;
-  /// Items as they were sent or received.
+  /// A view of items that were sent or received.
   using Items = std::span<const Item>;
 
   /// Requests with the same bytes, which may have been sent several times.
@@ -28,10 +29,10 @@ class OutstandingRequests {
     Request request;            ///< Items of the request.
     std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
     Buffer<Time, 4> sent_at{};  ///< Times at which the requests that are not lost were sent, the oldest first.
-    /// Time at which the oldest lost request counts as sent.
+    /// Time at which the oldest lost request is assumed to have been sent.
     Time lost_first{};
     Time lost_last{};   ///< Time at which the newest lost request was sent.
-    unsigned lost = 0;  ///< Number of lost requests.
+    unsigned lost = 0;  ///< Number of these requests that count as lost, but may still be answered.
 
     /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
@@ -47,7 +48,7 @@ class OutstandingRequests {
     unit_ = &unit;
     options_ = &options;
   }
-  /// Returns whether an encoder answers `request`.
+  /// Returns whether `request` is one that an encoder answers.
   [[nodiscard]] bool is_answered(Items request) const;
   /// Returns for how long after the last received item `request` must not be sent again.
   [[nodiscard]] Time pause_after(Items request) const;
@@ -76,7 +77,7 @@ class OutstandingRequests {
   void add(Items request, std::size_t expect, Time sent_at);
   /// Marks all requests equal to `request` as lost. The oldest counts as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
-  /// Removes the oldest request of `entry`, because its reply was received.
+  /// Removes the oldest request with these bytes, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
@@ -93,7 +94,7 @@ class OutstandingRequests {
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
   Buffer<Entry, most> entries_{};
-  Time newest_{};            // when the last added request was sent
+  Time newest_{};            // time at which the last added request was sent
   Time longest_interval_{};  // longest time between two consecutively added requests since the list was empty
 };
 

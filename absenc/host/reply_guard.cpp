@@ -10,14 +10,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Required silence in multiples of the longest timeout; see `required_silence`.
+// Silence that `required_silence` demands on the line, in multiples of the longest timeout.
 constexpr int silent_timeouts = 4;
 // Upper limit of a wait for late replies, unless 3/2 of the expected lateness is longer.
 constexpr Time longest_silence = 2500ms;
-// Least silence after which the replies that a stalled line delayed count as lost.
+// Shortest silence after which replies that a stalled line has delayed count as lost.
 constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
-// Items that arrive for less than this time are not taken for noise.
+// Items that keep arriving for less than this time are not taken for noise.
 constexpr Time least_noise = 100ms;
 constexpr Time tick{1};
 
@@ -81,9 +81,9 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // A pause of up to 1 ms is left to the port, which keeps it more exactly than a timer.
+  // A request at most 1 ms ahead is left to the port, which keeps the time more exactly than a timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  // `send` clears a list that is still full.
+  // If the list of outstanding requests is full, the guard waits for silence; `send` then clears the list.
   if (outstanding_.full()) {
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
@@ -113,7 +113,7 @@ Step<Item> ReplyGuard<Item>::send(Time now) {
   return pending_.step;
 }
 
-// Enters listening, because the stored reply may answer `entry`.
+// Enters the phase listening, because the stored reply may be a late one to the request `entry`.
 template <class Item>
 void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   const Time suspected = matching_.first_at - entry.oldest();
@@ -124,7 +124,7 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// Returns how long to listen, from the end of the request.
+// Returns how long the phase listening lasts, from the end of the request.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -158,7 +158,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // The time limit for the reply has passed.
+        // The time limit for the reply has passed, so the phase matching ends.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);
@@ -170,7 +170,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
-// Returns the conversation's next step or, if that is a request, the step of delaying.
+// Returns the conversation's next step. If it is a request, enters the phase delaying and returns its step.
 template <class Item>
 Step<Item> ReplyGuard<Item>::forward(Time now) {
   Step<Item> step = next_of_conversation(now);
@@ -300,7 +300,7 @@ void ReplyGuard<Item>::store(Items items, Time at) {
   if (received_.empty()) return;
   matching_.received_at = at;
   if (!is_can && at - matching_.first_at >= noise_limit()) return conclude_noise();
-  // The first items of a reply of unknown length may look like a complete reply.
+  // The first items of a reply of unknown length may look like a complete reply, so they prove nothing.
   const std::size_t expected = is_can ? 1 : pending_.step.expect;
   if (expected == 0 || received_.size() < expected) return;
   const bool complete =
@@ -342,7 +342,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
     if (const Entry* entry = outstanding_.find_by_reply(received_)) return enter_listening(*entry);
   }
   const bool valid = received && !matching_.damaged && outstanding_.is_reply(last_.items, received_);
-  // The line keeps the order of replies: those to earlier requests have arrived or are lost.
+  // The line keeps the order of replies: after a reply to the last request, those to earlier ones cannot arrive.
   if (valid) outstanding_.clear();
   if (!received) received_.append(matching_.foreign_frame);
   enter_forwarding({.answerable = true,
@@ -355,7 +355,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
                                .received_at = matching_.received_at}});
 }
 
-// Ends matching: no reply can be matched on a line that is never silent.
+// Ends the phase matching without a reply: on a line that is never silent no reply can be matched to a request.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
   received_.clear();
@@ -367,7 +367,7 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Keeps the last items, which the conversation does not get, to detect late replies.
+// Drops items that do not go to the conversation, but stores the last of them to detect late replies.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -379,13 +379,13 @@ void ReplyGuard<Item>::drop_items(Items items, Time at) {
     if (i < outstanding_.size()) {
       drop_late_reply(&outstanding_[i], at);
     } else if (!is_can && last_.exists && ends_with_reply(last_.items, last_.expect)) {
-      // A second reply to the last request: the first one may have belonged to an earlier request.
+      // The line has sent a second reply to the last request: the first may have belonged to an earlier request.
       drop_late_reply(nullptr, at);
     }
   }
 }
 
-// A late reply of unknown length ends with silence.
+// Checks the stored items, because a late reply of unknown length ends with silence.
 template <class Item>
 void ReplyGuard<Item>::drop_at_silence(Time at) {
   if (received_.empty()) return;
@@ -397,14 +397,14 @@ void ReplyGuard<Item>::drop_at_silence(Time at) {
   received_.clear();
 }
 
-// Checks only the last items, because noise may precede the reply.
+// Returns whether the last received items are a reply to `request`. Noise may precede the reply.
 template <class Item>
 bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const {
   const std::size_t size = is_can ? 1 : expect;
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// `entry`: the request that the reply answers; null: it is a second reply to the last request.
+// Drops a late reply. `entry`: the request that it answers; null: it is a second reply to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();
@@ -414,7 +414,7 @@ void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   Time& until = delaying ? delaying_.until : listening_.until;
   if (delaying && outstanding_.empty()) {
     until = std::max(at + pending_.step.gap, pending_.step.at);
-  } else if (!is_can) {  // a reply on CAN may have been unsolicited, so it prolongs nothing
+  } else if (!is_can) {  // on CAN the reply may have been unsolicited, so the wait is not prolonged
     until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }
 }
@@ -424,11 +424,11 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The reply may answer any of several equal requests: the newest gives the least lateness.
+    // The reply may answer any of several equal requests; the time since the newest one is its least lateness.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));
-  // If no reply was late before, a second reply is most likely a duplicate.
+  // If no reply was late so far, a second reply to one request is most likely a duplicate.
   if (entry == nullptr && late_replies_ == 0) return;
   ++late_replies_;
   // Another reply was received while listening, so the stored reply was late.

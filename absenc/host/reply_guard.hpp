@@ -38,8 +38,8 @@ namespace absenc::host {
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:
-  /// Serves `inner` from now on; `inner`, `unit` and `options` must live until another one is attached. `may_repeat`:
-  /// whether each request of the conversation may be sent once more.
+  /// Serves the conversation `inner` from now on; `inner`, `unit` and `options` must live until another one is
+  /// attached. `may_repeat`: whether each request of the conversation may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
   /// Returns whether this guard serves the conversation `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
@@ -68,7 +68,7 @@ class ReplyGuard final : public Machine<Item> {
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // whether to feed a `received` event with the items of `received_`
+    bool reply = false;  // whether to feed a `received` event with the items that arrived
     bool timeout = false;
     Time received_at{};
   };
@@ -81,31 +81,32 @@ class ReplyGuard final : public Machine<Item> {
   struct Delaying {
     Time until{};            // earliest time at which the delayed request is sent
     Time received_at{};      // when the last item was received while delaying; if none was, `gap` before delaying began
-    Time noise_end = never;  // when the request is sent even if items still arrive
+    Time noise_end = never;  // time at which the request is sent even if items still arrive
   };
   struct Matching {
     // End of the time limit for the reply, which starts at the end of the request.
     Time until = never;
-    Time first_at{};       // when the first of the stored items was received
+    Time first_at{};       // time at which the first of the stored items was received
     Time received_at{};    // when the last of the stored items was received; if none was stored, end of the request
     bool damaged = false;  // a line error was received, or, except on CAN, the time limit passed
-    // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29.
+    // CAN: a frame that would be the reply if its identifier had 11 bits and not 29.
     Buffer<Item, 1> foreign_frame{};
   };
   struct Listening {
     Time until{};      // end of listening: the request is then repeated, or a timeout reported
-    Time suspected{};  // lateness of the stored reply, if it is late
+    Time suspected{};  // how late the stored reply is, if it is a late one
   };
   // The request that the conversation wants to send; valid in all phases but forwarding.
   struct Pending {
     Step<Item> step{};
-    Time deadline{};  // time after which late replies no longer prolong delaying and listening
+    Time deadline{};  // time after which late replies no longer prolong the phases delaying and listening
   };
   struct LastRequest {
     bool exists = false;
-    Request items{};  // items of the last request; empty if it was a pulse
+    Request items{};  // items of the last request; empty if the request was a pulse
     std::size_t expect = 0;
-    Time sent_at{};  // time of the last `sent` event, even if not of a request; until then, when `send` was called
+    // time of the last `sent` event, even if not of a request; before that, the time when the request was handed over
+    Time sent_at{};
   };
 
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
@@ -142,7 +143,7 @@ class ReplyGuard final : public Machine<Item> {
   Machine<Item>* inner_ = nullptr;
   bool may_repeat_ = false;
 
-  // The data of each phase is reset when the phase is entered.
+  // The data of each phase is reset when the guard enters it.
   Phase phase_ = Phase::forwarding;
   Forwarding forwarding_{};
   Delaying delaying_{};
@@ -154,9 +155,9 @@ class ReplyGuard final : public Machine<Item> {
   Pending pending_{};
   LastRequest last_{};
   OutstandingRequests<Item> outstanding_;
-  // Longest time from a request to the silence that showed that its reply is missing.
+  // Longest time from a request to the `silence` event that showed that its reply is missing.
   Time longest_timeout_{};
-  // Time by which a reply may be late. Each end of listening reduces it by 1/16.
+  // Time by which a reply may be late. It is reduced by 1/16 at each end of the phase listening.
   Time expected_lateness_{};
   Time greatest_lateness_{};
   std::uint64_t late_replies_ = 0;

@@ -20,11 +20,13 @@
 
 namespace absenc::host {
 
-/// Counters of a session: its conversations and their errors.
+/// Counters of a session: conversations and errors.
 struct Counters {
-  std::uint64_t good = 0;       ///< good conversations not found wrong later; each result of a stream counts
-  std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
-  std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
+  /// conversations without an error whose position was not found wrong later; each result of a stream counts
+  std::uint64_t good = 0;
+  std::uint64_t repeated = 0;  ///< repeated attempts, each after an error
+  /// replies on the line that arrived after their timeout and were dropped, also those for other encoders
+  std::uint64_t late = 0;
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
   /// Number of errors of each kind, also of repeated attempts; indexed by Error.
   std::array<std::uint64_t, error_texts.size()> errors{};
@@ -37,7 +39,7 @@ struct Counters {
   }
 };
 
-/// A filter between the conversation, or its reply guard, and the echo filter.
+/// A filter between the echo filter and the reply guard; without a guard, before the conversation itself.
 template <class Item>
 struct Filter : Machine<Item> {
   /// Sets the machine to which the filter passes events from now on.
@@ -47,7 +49,7 @@ struct Filter : Machine<Item> {
   ~Filter() = default;
 };
 
-/// Selects which reading of an encoder that transmits unsolicited is returned.
+/// Selects the reading that is returned for an encoder that transmits unsolicited.
 enum class Take : std::uint8_t {
   newest,  ///< the first reading that is received after the call
   every,   ///< the reading that follows the last returned one, however long ago it was received
@@ -77,15 +79,15 @@ class Session {
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
     const Conversation<Item>* conversation = attempt(command, arguments, on_emit);
-    streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
+    streaming_ = false;  // each `run` begins a new conversation; only `next` and `read` continue a stream
     return conversation;
   }
-  /// Runs `command` and ignores the results before the end.
+  /// Runs `command` to its end and ignores results that it emits before.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but may continue its stream: `arguments` are then ignored.
+  /// Runs `command` like `run`, but continues its stream if one is open; `arguments` are then ignored.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -112,7 +114,7 @@ class Session {
         known_ = true;
         return conversation;
       }
-      // An encoder with an invalid position may be starting, unless a position was confirmed.
+      // Without a valid position the encoder may be starting, so it is read again, unless one was confirmed before.
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
@@ -133,9 +135,10 @@ class Session {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }
 
-  /// Uses `guard`, which must outlive the session. The sessions of all encoders on a line share one.
+  /// Makes the session use `guard`, which must outlive it. All sessions on one line share one guard.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Sets the filter of later commands; null: none. Not while a stream may continue. It must outlive the session.
+  /// Sets the filter of later commands, which must outlive the session; null: none. Do not call it while a stream may
+  /// continue.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
   /// Returns ReplyGuard::lateness as of the end of the last command.
   [[nodiscard]] Time lateness() const { return lateness_; }
@@ -145,7 +148,7 @@ class Session {
     options_ = options;
     follow_options();
   }
-  /// Sets the encoder's speed limit from the next reading on, and forgets the positions before.
+  /// Sets the speed limit of the encoder from the next reading on, and forgets all positions read before.
   void set_speed_limit(const SpeedLimit& limit) {
     limit_ = limit;
     follow_options();
@@ -154,7 +157,7 @@ class Session {
   /// Sets the statistics to which the results of later attempts are added; null: none.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
-  /// Requires the next position to be confirmed, because the encoder may be another one now.
+  /// Requires confirmation of the next position, because the encoder may have been exchanged.
   void doubt() {
     confirmed_ = false;
     known_ = false;
@@ -175,7 +178,7 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
-  // Positions of other options or of another speed limit cannot be compared with the next one.
+  // Forgets the stored positions, because those read with other options or another speed limit are not comparable.
   void follow_options() {
     first_ = FirstReading(reach());
     apart_ = Apart(times());
@@ -189,7 +192,8 @@ class Session {
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // Stores a position; returns whether it is confirmed. `follows`: read directly after the last.
+  // Stores the position of `reading`; returns whether it is confirmed. `follows`: it was read directly after the last
+  // reading.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -216,7 +220,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // set again when the conversation has given its next result
+      streaming_ = false;  // set to true again when the conversation has given its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -229,7 +233,7 @@ class Session {
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // after a timeout the encoder may have been switched off
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      // A reply was late, and that of another attempt would most likely be, too.
+      // A reply arrived after the timeout, and the reply to another attempt would most likely be late, too.
       if (error == Error::timeout && late() != late_before) return conversation;
       ++counters_.repeated;
     }
@@ -249,7 +253,8 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // No reply is late where the host drives the clock; on CAN a listener needs all frames.
+  // Returns whether the reply guard is used. No reply is late where the host drives the clock; on CAN a conversation
+  // that listens needs all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return !host_clocks(unit_->link);
@@ -275,7 +280,7 @@ class Session {
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // The guard may have served another encoder on the line meanwhile.
+    // Meanwhile the reply guard may have served another encoder on the line.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }
@@ -287,7 +292,7 @@ class Session {
       }
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
-    // The values are copied, because the guard may serve another encoder when they are read.
+    // The guard's values are copied, because it may serve another encoder when they are asked for.
     counters_.late = guard_->late();
     lateness_ = guard_->lateness();
     return ended;
@@ -297,11 +302,11 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
-  Conversation<Item>* current_ = nullptr;  // present conversation, constructed in `storage_`
-  const Command* command_ = nullptr;       // command that `current_` executes
+  Conversation<Item>* current_ = nullptr;  // present conversation, which was constructed in the session's storage
+  const Command* command_ = nullptr;       // command that the present conversation executes
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
-  bool guarded_ = false;  // whether the present conversation is guarded
+  bool guarded_ = false;  // whether the reply guard serves the present conversation
   Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;
@@ -312,7 +317,7 @@ class Session {
   Time shortest_interval_ = never;      // shortest time between a reading and one that was read directly after it
   bool confirmed_ = false;              // the last reading was confirmed
   bool known_ = false;                  // a reading was confirmed since the last call of `doubt`
-  bool streaming_ = false;              // `current_` has stopped at a result and can continue
+  bool streaming_ = false;              // the present conversation has stopped at a result and can continue
   std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream when it stopped last
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;

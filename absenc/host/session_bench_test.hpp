@@ -23,7 +23,7 @@ struct Still final : Shaft {
   }
   std::int64_t position = 0;
   const Device<std::uint8_t>* device = nullptr;
-  // Number of the answer that contains `wrong_position`, from 0; UINT64_MAX: none.
+  // Index, from 0, of the encoder's answer that gets `wrong_position`; UINT64_MAX: no answer.
   std::uint64_t wrong_answer = UINT64_MAX;
   std::int64_t wrong_position = 0;
 };

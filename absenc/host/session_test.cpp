@@ -140,7 +140,8 @@ TEST(ReplyGuard, LongReplyOnSlowLineIsNoNoise) {
   guard.conclude();
   OneRequest answered;
   send(answered, request);
-  for (const std::uint8_t& byte : reply) EXPECT_EQ(receive({&byte, 1}, 20ms), Kind::wait);  // for 120 ms
+  // six bytes, 20 ms apart: 120 ms
+  for (const std::uint8_t& byte : reply) EXPECT_EQ(receive({&byte, 1}, 20ms), Kind::wait);
   EXPECT_EQ(answered.heard, reply);
 
   guard.conclude();
@@ -165,7 +166,8 @@ TEST(Session, RepeatsRepeatableCommands) {
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  EXPECT_EQ(bench.device->answer_count(), 6u);  // 3 more position requests; the reset of the zero command is never sent
+  // 3 more position requests; the reset request of the zero command is never sent
+  EXPECT_EQ(bench.device->answer_count(), 6u);
 }
 
 TEST(Session, FeedsStatisticsWithEveryAttempt) {
@@ -239,7 +241,7 @@ TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
 
 TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   Bench bench(EchoMode::off);
-  bench.device->raise_alarms(0x04);  // alarm bit counting_error
+  bench.device->raise_alarms(0x04);  // 0x04 is the alarm bit counting_error
   const auto& reading = bench.read();
   EXPECT_EQ(reading.error(), Error::none);
   EXPECT_FALSE(reading.reading()->singleturn_valid());
@@ -257,7 +259,7 @@ TEST(SessionGuard, ReadsImpossiblePositionAgain) {
   bench.session->observe(&statistics);
   EXPECT_EQ(bench.answers_of_a_reading(), 2u) << "the first needs a second";
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
-  bench.answer_wrong(turn / 32);  // farther than 10 000 rpm allow, and nearer than a jump
+  bench.answer_wrong(turn / 32);  // farther than the shaft can move at 10 000 rpm, but too near to count as a jump
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
   EXPECT_TRUE(bench.session->confirmed());
   EXPECT_EQ(bench.refused(), 1u);
@@ -317,7 +319,7 @@ TEST(SessionGuard, TurnsConfirmAfterALongPause) {
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
 }
 
-// A reading takes 51 us, in which the shaft turns nearly once: a second one tells no more.
+// A reading takes 51 us, in which this shaft can turn nearly once, so a second reading cannot confirm the first.
 TEST(SessionGuard, RefusesHalfATurnIfSecondReadingTakesTooLong) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.session->set_speed_limit({.rpm = 1'000'000});
@@ -358,7 +360,7 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();
-  bench.device->raise_alarms(0x04);  // alarm bit counting_error
+  bench.device->raise_alarms(0x04);  // 0x04 is the alarm bit counting_error
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
   EXPECT_FALSE(bench.session->confirmed());
   bench.device->lower_alarms(0x04);

@@ -13,11 +13,11 @@ namespace absenc::host {
 struct SpeedLimit {
   /// Speed limit of rotary encoders in revolutions per minute.
   std::uint32_t rpm = 10'000;
-  /// Speed limit of linear encoders in mm/s. Default: no linear axis is assumed to be faster.
+  /// Speed limit of linear encoders in mm/s. The default is a speed that no linear axis is assumed to exceed.
   std::uint32_t mm_s = 20'000;
 };
 
-/// Multiple of the speed limit up to which a movement is too fast, but no jump.
+/// A movement faster than the speed limit counts as a jump only from this multiple of the limit on.
 inline constexpr unsigned most_excess = 4;
 
 /// Returns the speed limit of the model in `options`, or else the default limit.
@@ -55,18 +55,20 @@ class Reach {
  public:
   /// Returns the reach of a shaft of at most `rpm` revolutions per minute.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
-    constexpr std::uint64_t turns_a_ns_of_1_rpm = 2'459'565'877;  // 1 rpm in turns per ns, times 2^67, rounded up
+    // the speed 1 rpm in turns per ns, times 2^67, rounded up
+    constexpr std::uint64_t turns_a_ns_of_1_rpm = 2'459'565'877;
     return {turns_a_ns_of_1_rpm * rpm, 67, true};
   }
   /// Returns the reach of a carriage of at most `mm_s` mm/s with counts of `unit_um` micrometres, above 0.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
-    // unit_um = unit * 2^exponent. These are taken from its bits, so that no floating point is linked.
+    // unit_um = unit * 2^exponent. Both are taken from the bits of the number, so that no floating point is linked.
     const auto bits = std::bit_cast<std::uint64_t>(unit_um);
-    const std::uint32_t unit = static_cast<std::uint32_t>(bits >> 21) | 0x8000'0000;  // rounded down
+    // mantissa of `unit_um`, rounded down to 32 bits
+    const std::uint32_t unit = static_cast<std::uint32_t>(bits >> 21) | 0x8000'0000;
     const int exponent = static_cast<int>(bits >> 52 & 0x7FF) - (1023 + 31);
     if (mm_s == 0) return {0, 0, false};
     const int zeros = std::countl_zero(std::uint64_t{mm_s});
-    const std::uint64_t speed = (std::uint64_t{mm_s} << zeros) / unit + 1;  // 2^31 to 2^33
+    const std::uint64_t speed = (std::uint64_t{mm_s} << zeros) / unit + 1;  // the quotient is from 2^31 to 2^33
     return {(speed << 30) / 1'000'000 + 1, zeros + exponent + 30, false};
   }
   /// Returns the reach of the shaft or carriage that `resolution` describes, within `limit`.
@@ -74,7 +76,7 @@ class Reach {
     return is_linear(resolution.unit_um) ? of_carriage(limit.mm_s, resolution.unit_um) : of_shaft(limit.rpm);
   }
 
-  /// Returns the reach at `times` the speed limit.
+  /// Returns the reach at a speed of `times` times the speed limit.
   [[nodiscard]] constexpr Reach at_excess(std::uint32_t times) const {
     return {std::uint64_t{factor_} * times, shift_, turns_};
   }
@@ -98,14 +100,14 @@ class Reach {
     shift_ = static_cast<std::int16_t>(shift - halvings);
   }
 
-  // Halves `value`, rounded up, until it fits into 32 bits. Returns how often.
+  // Halves `value`, rounded up, until it fits into 32 bits. Returns the number of halvings.
   static constexpr int halve(std::uint64_t& value) {
     int halvings = 0;
     for (; value >> 32 != 0; ++halvings) value = (value >> 1) + (value & 1);
     return halvings;
   }
 
-  // Returns the distance in turns (linear: counts), times 2^bits.
+  // Returns the distance moved in the time `between`, in turns (linear: counts), times 2^bits.
   [[nodiscard]] constexpr std::uint64_t scaled(Time between, int bits) const {
     constexpr std::uint64_t most = ~std::uint64_t{0};
     auto time = static_cast<std::uint64_t>(between > Time{} ? between.count() : 0);

@@ -15,7 +15,7 @@
 
 namespace absenc::host {
 
-/// A distribution of reply latencies in about 4 kB. Percentiles below 68.7 s are at most 1/32 too long.
+/// A distribution of reply latencies in about 4 kB of memory. Percentiles below 68.7 s are at most 1/32 too long.
 class Latencies {
  public:
   /// Adds the latency of a reply.
@@ -34,7 +34,7 @@ class Latencies {
   /// Returns the sum of all latencies, each limited to 0 to 68.7 s.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
-  /// Returns how many latencies surely do not exceed each of the ascending limits, all below 68 s.
+  /// For each of the ascending `limits`, all below 68 s, returns how many latencies surely do not exceed it.
   template <std::size_t Size>
   [[nodiscard]] constexpr std::array<std::uint64_t, Size> within(const std::array<Time, Size>& limits) const {
     std::array<std::uint64_t, Size> counts{};
@@ -57,7 +57,7 @@ class Latencies {
   }
 
  private:
-  static constexpr unsigned fine_bits = 5;  // 32 buckets for each power of two from 32 ns on
+  static constexpr unsigned fine_bits = 5;  // There are 32 buckets for each power of two from 32 ns on.
   static constexpr unsigned most_bits = 36;
   static constexpr std::int64_t most = (std::int64_t{1} << most_bits) - 1;
 
@@ -81,7 +81,7 @@ class Latencies {
   Time longest_{};
 };
 
-/// The rate of events per second: a mean that forgets with a time constant of one second.
+/// The rate of events per second: a mean in which older events count less, with a time constant of one second.
 class Rate {
  public:
   /// Adds an event that happened at `at`.
@@ -112,8 +112,8 @@ class Rate {
 
   bool seen_ = false;
   Time last_{};
-  double events_ = 0;       // number of events, which fades with their age
-  double nanoseconds_ = 0;  // time in which `events_` arrived, which fades with its age
+  double events_ = 0;       // number of events, in which older ones count less
+  double nanoseconds_ = 0;  // time in which these events arrived, in which older times count less
 };
 
 /// A failed exchange with its bytes, which are cut at the size of the buffers.
@@ -127,7 +127,7 @@ struct BadExchange {
   }
 
   Error error = Error::none;  ///< Error with which the exchange failed.
-  Time at{};                  ///< time at which the last item of the exchange was received, or sent
+  Time at{};  ///< time at which the last item of the exchange was received; without a reply, time of sending
   /// First items of the request, at most 64 bytes.
   Buffer<Item, 64 / sizeof(Item)> sent{};
   /// First items of the reply, at most 64 bytes.

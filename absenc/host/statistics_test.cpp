@@ -25,7 +25,7 @@ TEST(Latencies, AreAtMostA32ndTooLong) {
   for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
     Latencies latencies;
     latencies.add(Time(value));
-    latencies.add(70s);  // a longer latency follows, because the longest one is stored exactly
+    latencies.add(70s);  // a longer latency must follow, because the longest latency is stored exactly
     const std::int64_t told = latencies.percentile(0).count();
     ASSERT_GE(told, value);
     ASSERT_LE(told, value + value / 32);
@@ -49,7 +49,7 @@ TEST(Latencies, AreCountedWithinLimits) {
   for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
     latencies.add(latency);
   }
-  // 999.9 us is in the last 1/32 below its limit: it is counted with the next limit.
+  // 999.9 us is within 1/32 below the limit of 1 ms, so it is counted only at the next limit.
   EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));
   EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }
@@ -84,7 +84,7 @@ TEST(Rate, FallsWithoutEvents) {
   EXPECT_LT(rate.per_second(1000s), 0.01);
 }
 
-/// A conversation with a given result.
+/// A conversation that has ended with the result that a test sets.
 struct Ended final : Conversation<std::uint8_t> {
   void feed(const Event<std::uint8_t>&) override {}
   Step<std::uint8_t> next(Time) override { return {.kind = Step<std::uint8_t>::Kind::done}; }
@@ -143,7 +143,7 @@ TEST(Statistics, CountsGoodConversations) {
   EXPECT_EQ(statistics.latencies().count(), 4u);
   EXPECT_EQ(statistics.latencies().longest(), 90us);
   EXPECT_EQ(statistics.kept(), 1u);
-  ended.sent_at = ended.received_at;  // no request was sent
+  ended.sent_at = ended.received_at;  // equal times: the exchange had no request
   statistics.add(ended);
   EXPECT_EQ(statistics.latencies().count(), 4u);
 }

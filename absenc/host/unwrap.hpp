@@ -17,19 +17,20 @@ namespace absenc::host {
 /// counts.
 class Unwrapper {
  public:
-  /// How a reading joins the positions before it.
+  /// How a reading was joined to the continuous position.
   enum class Joined : std::uint8_t {
     ignored,    ///< the reading has no valid position
-    started,    ///< the first position, which is the encoder's own
+    started,    ///< the first reading with a position: the continuous position starts with the encoder's own
     continued,  ///< the distance since the last valid position was added
-    restarted,  ///< the distance is not sure after the pause: the position starts again with the encoder's own
+    restarted,  ///< the distance is not sure after a long pause: the position starts again with the encoder's own
   };
 
-  /// Makes a continuous position within `limit`. `times` is the meaning of Reading::latched.
+  /// Makes a continuous position of a shaft or carriage that keeps to `limit`. `times` is the meaning of
+  /// Reading::latched.
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
       : limit_(limit), reach_(Reach::of_shaft(limit.rpm)), times_(times), apart_(times) {}
 
-  /// Adds `reading` with the latch interval that its own times allow. Returns how it was joined.
+  /// Adds `reading`, whose latch interval follows from its own times. Returns how it was joined.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
   /// Adds `reading`, which was latched in the interval `at`. Returns how it was joined.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {
@@ -46,11 +47,11 @@ class Unwrapper {
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
-  /// Returns whether `reading` is a jump from the last added one; false if that is not known.
+  /// Returns whether `reading` is a jump from the last added reading; false if this cannot be known.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
-    constexpr Time vague{1'000'000};    // uncertainty of the latch time: 1 ms
-    constexpr std::uint64_t noise = 4;  // noise of a position, in counts
+    constexpr Time vague{1'000'000};    // assumed uncertainty of the latch time: 1 ms
+    constexpr std::uint64_t noise = 4;  // assumed noise of a position, in counts
     const Reach reach = reach_of(reading).at_excess(most_excess);
     const auto step = static_cast<std::uint64_t>(way(reading));
     const std::uint64_t moved = way(reading) < 0 ? 0 - step : step;
@@ -86,7 +87,7 @@ class Unwrapper {
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }
-  // Calculates the reach only if the unit changes, because that takes long.
+  // Calculates the reach anew only if the length of a count differs from the last reading's, because that takes long.
   [[nodiscard]] constexpr Reach reach_of(const Reading& reading) const {
     const bool same = std::bit_cast<std::uint64_t>(reading.unit_um) == std::bit_cast<std::uint64_t>(last_.unit_um);
     return same ? reach_ : Reach::of(limit_, {.unit_um = reading.unit_um});
@@ -95,14 +96,15 @@ class Unwrapper {
   [[nodiscard]] constexpr std::uint64_t share(const Reading& reading, Time between) const {
     return reach_of(reading).share(between, resolution_of(reading));
   }
-  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, times 2^32
+  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, as a fraction times 2^32
 
-  // Judges as `longest_gap` does.
+  // Returns whether the shaft can have moved by at most 15/16 of half the counted range since the last reading;
+  // `longest_gap` has the same limit.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return share(reading, apart(reading)) < half / 16 * 15;
   }
 
-  // Leaves out the margin of `longest_gap`, because the intervals state the unknown latch times.
+  // Allows the whole half of the counted range, because the intervals `at` already contain the unknown latch times.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     return times_ == Times::arrived || share(reading, at.latest - last_at_.earliest) < half;
   }
@@ -118,12 +120,13 @@ class Unwrapper {
   }
 
   SpeedLimit limit_;
-  Reach reach_;  // reach within `limit_`, in the unit of `last_`
+  // distances that are possible within the speed limit, for counts of the length that the last reading has
+  Reach reach_;
   Times times_;
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // unsigned, so that a wrap after 2^63 counts is defined
+  std::uint64_t position_ = 0;  // the number is unsigned, so that its wrap after 2^63 counts is defined
   Reading last_{};
   LatchTime last_at_{};
 };

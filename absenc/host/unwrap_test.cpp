@@ -70,7 +70,7 @@ TEST(Unwrapper, UsesTurnAloneIfTurnsAreInvalid) {
   lost.multiturn_valid = false;
   EXPECT_EQ(unwrapper.add(lost), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 8);
-  // The turns are valid again, but have another value, which no motion explains.
+  // The turns are valid again, but differ by more than any motion explains.
   EXPECT_EQ(unwrapper.add(multiturn(0, 20, 2ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
@@ -89,7 +89,7 @@ TEST(Unwrapper, IgnoresInvalidReadings) {
 }
 
 TEST(Unwrapper, RestartsAfterTooLongAPause) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // at this speed half a turn takes 5 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // at 6000 rpm half a turn takes 5 ms
   unwrapper.add(singleturn(1000, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 4ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 1034);
@@ -106,7 +106,7 @@ TEST(Unwrapper, HasADefaultLimit) {
 }
 
 TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at this speed 8 turns take 800 ms, and half a turn 50 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at 600 rpm 8 turns take 800 ms, and half a turn takes 50 ms
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);
@@ -119,7 +119,7 @@ TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
 TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
   Unwrapper unwrapper;
   Reading reading = singleturn(1000, 0ms);
-  reading.unit_um = 1000;  // with 1000 um per count the counted range is 1.024 m
+  reading.unit_um = 1000;  // 1024 counts of 1000 um each are a range of 1.024 m
   unwrapper.add(reading);
   reading.singleturn = 10;
   reading.latched = 20ms;
@@ -143,7 +143,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // The speed limit is a tenth of a turn per ms.
+  // The speed limit of 6000 rpm is a tenth of a turn per ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
@@ -177,7 +177,7 @@ TEST(Unwrapper, TakesPositionsOf64Bits) {
   EXPECT_EQ(unwrapper.position(), 3);
 }
 
-// The compiler refuses an overflow in a constant.
+// The speeds are computed at compile time, where the compiler refuses an overflow.
 TEST(Unwrapper, TakesExtremeSpeedsTimesAndUnits) {
   constexpr Time begin{-(std::int64_t{1} << 62)};
   constexpr Time years{std::int64_t{1} << 58};
@@ -210,7 +210,7 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
 }
 
 TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
-  // At 10 000 rpm half a turn takes 3 ms. The third reply was late.
+  // At 10 000 rpm half a turn takes 3 ms. The reply of the third reading was late.
   Unwrapper unwrapper;
   unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});
   EXPECT_EQ(unwrapper.add(singleturn(300, 1ms), {1ms, 2ms}), Joined::continued);

@@ -16,7 +16,8 @@ namespace absenc::host {
 /// A speed with its uncertainty, both in thousandths of a count per second. The true speed is within `uncertainty` of
 /// `speed`. An uncertainty of `most` states that the speed may be greater than can be represented.
 struct MilliSpeed {
-  static constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();  ///< Greatest number of either.
+  /// Greatest value of `speed` and of `uncertainty`.
+  static constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();
   std::int64_t speed = 0;        ///< Speed in counts per 1000 s, -`most` to `most`.
   std::int64_t uncertainty = 0;  ///< Uncertainty of `speed` in counts per 1000 s, 0 to `most`.
 };
@@ -28,15 +29,18 @@ struct MilliSpeed {
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
-  static constexpr int longest_windows = 20;         ///< Multiple of `window` from which a less certain speed counts.
+  /// A window this many times as long as `window` is used even if its speed is less certain.
+  static constexpr int longest_windows = 20;
 
-  static constexpr Time longest_window = std::chrono::minutes(2);  ///< A longer `window` counts as this one.
+  /// Longest time for `window`; a longer one is reduced to it.
+  static constexpr Time longest_window = std::chrono::minutes(2);
 
-  /// `window`: desired time over which the speed is measured, above 0.
+  /// Makes the calculation. `window`: desired time over which the speed is measured, above 0.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50))
       : window_(window < longest_window ? window : longest_window) {}
 
-  /// Adds a position of `Unwrapper`. One not latched after the last one is not stored, and has no speed.
+  /// Adds a position of `Unwrapper`. A position that was not latched after the last stored one is not stored, and has
+  /// no speed.
   constexpr void add(std::int64_t position, const LatchTime& at) {
     start_ = none;
     if (size_ != 0 && at.middle() <= newest().at.middle()) return;
@@ -87,9 +91,9 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // Number of counts, and ratio of a window to its time uncertainty, that are enough.
+  // A window is certain enough with this many counts, and if it is this many times as long as its uncertainty.
   static constexpr int enough = 20;
-  static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
+  static constexpr int least = 4;  // ratio of window to uncertainty from which the longest window is used
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {
@@ -115,7 +119,8 @@ class Velocity {
   // of its value at most.
   [[nodiscard]] static constexpr std::int64_t rate(std::uint64_t counts, Time time, Rounding rounding) {
     const Rounding opposite = rounding == Rounding::up ? Rounding::down : Rounding::up;
-    constexpr std::uint64_t five_to_the_12th = 244'140'625;  // 1000 s are 10^12 ns: 5^12 * 2^12
+    // the unit is counts per 1000 s, which are 10^12 ns: 5^12 * 2^12
+    constexpr std::uint64_t five_to_the_12th = 244'140'625;
     const std::uint64_t carry = rounding == Rounding::up ? 1 : 0;
     if (counts == 0) return 0;
     if (time <= Time{}) return MilliSpeed::most;
@@ -127,7 +132,7 @@ class Velocity {
     const int zeros = std::countl_zero(product);
     product <<= zeros;
     shift -= zeros;
-    // With Rounding::up, (a - 1) / b + 1 is a / b rounded up.
+    // Rounds up with Rounding::up, since (a - 1) / b + 1 is a / b rounded up.
     const std::uint64_t quotient = (product - carry) / divisor + carry;
     constexpr auto most = static_cast<std::uint64_t>(MilliSpeed::most);
     std::uint64_t whole = most;
@@ -139,7 +144,7 @@ class Velocity {
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
-  // A distance may be one count longer or shorter than measured.
+  // The true distance may be one count longer or shorter than the measured one.
   [[nodiscard]] constexpr double fastest() const {
     return per_second(static_cast<double>(moved_from(start_)) + 1, shortest_time());
   }
@@ -149,7 +154,7 @@ class Velocity {
     return per_second(static_cast<double>(way) - 1, longest_time());
   }
 
-  // Drops old positions, but keeps one that is as old as the longest window or older.
+  // Drops old positions, but keeps at least one that is as old as the longest window.
   constexpr void forget_old() {
     std::size_t old = 0;
     while (old + 2 < size_ && span(old + 1) >= longest_windows * window_) ++old;
@@ -172,7 +177,7 @@ class Velocity {
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
   }
-  // Uses units of about 1 us, so that a product of two fits into 64 bits.
+  // The times are in units of about 1 us, so that the product of two fits into 64 bits.
   [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
     return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
   }
@@ -193,7 +198,7 @@ class Velocity {
       if (!fills_window && i > 0) continue;
       const std::uint64_t way = moved_from(i);
       const bool is_resolved = way == 0 ? fills_window : way >= enough;
-      // Uncertainty of the length of the window, to either side.
+      // The length of the window may be wrong by this time, to either side.
       const Time open = (newest().at.width() + positions_[i].at.width()) / 2;
       const bool is_longest = length >= longest_windows * window_;
       if ((is_resolved && enough * open <= length) || (is_longest && least * open <= length)) {
@@ -206,7 +211,7 @@ class Velocity {
   Time window_;
   std::array<Sample, most_positions> positions_{};  // stored positions with their latch times, the oldest first
   std::size_t size_ = 0;
-  std::size_t start_ = none;  // index of the position that begins the selected window
+  std::size_t start_ = none;  // index of the stored position with which the selected window begins
 };
 
 }  // namespace absenc::host

@@ -143,7 +143,7 @@ TEST(Velocity, SpeedIsInCountsPer1000Seconds) {
   EXPECT_EQ(velocity.speed().uncertainty, 334);
 }
 
-// The compiler refuses an overflow in a constant.
+// The speed is computed at compile time, where the compiler refuses an overflow.
 constexpr MilliSpeed speed_between(std::int64_t from, std::int64_t to, Time pause) {
   Velocity velocity(1ns);
   velocity.add(from, Time{});

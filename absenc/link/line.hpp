@@ -8,11 +8,11 @@
 
 namespace absenc {
 
-/// How items (bytes, bits or frames) travel.
+/// Kinds of links: how items (bytes, bits or frames) travel.
 enum class LinkKind : std::uint8_t {
   half_duplex,  ///< one pair for both directions (RS-485): never send while the other side sends
-  full_duplex,  ///< a pair for each direction (RS-422, RS-232, USB serial)
-  spi,          ///< the host's clock moves one byte in each direction at once
+  full_duplex,  ///< a pair of wires for each direction (RS-422, RS-232, USB serial)
+  spi,          ///< SPI: the host's clock moves one byte in each direction at the same time
   /// The host clocks bits out of the encoder (SSI, BiSS), packed MSB first, the last byte left-aligned.
   clocked,
   /// As clocked, but the direction of the data line turns: the host sends bits first, then the encoder (EnDat).
@@ -44,9 +44,9 @@ struct LineSettings {
   std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
   /// Data bits of each character, 5 to 16, the lowest first. More than 8 bits carry two bytes, the low one first.
   std::uint8_t data_bits = 8;
-  std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
+  std::uint8_t spi_mode = 0;     ///< SPI and clocked links: clock mode, 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
-  Time select_lead{};            ///< spi: minimum time from chip select to the first clock
+  Time select_lead{};            ///< SPI: minimum time from chip select to the first clock
   /// Highest rate in bits per second that the encoder's document allows; 0: not stated.
   std::uint32_t highest_rate = 0;
 

@@ -12,10 +12,11 @@ struct Port {
   /// Returns the time on the port's own clock, which never runs backwards.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// Begins a transfer, pulse or configure step. Items may be reported before its `sent`.
+  /// Begins a transfer, pulse or configure step. Items may be reported before the event `sent` of this step.
   virtual void begin(const Step<Item>& step) = 0;
 
-  /// Blocks until the next event for a machine that waits with `step`. Its items are valid until the next `wait`.
+  /// Blocks until the next event for a machine that waits with `step`, and returns it. The items of the event are valid
+  /// until the next `wait`.
   [[nodiscard]] virtual Event<Item> wait(const Step<Item>& step) = 0;
 
  protected:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule for the `silence` event of ports and simulated lines.
+// The rule by which ports and simulated lines report the event `silence`.
 #pragma once
 
 #include "absenc/link/step.hpp"
@@ -10,7 +10,7 @@ namespace absenc {
 class Silence {
  public:
   Silence() = default;
-  /// Makes a timer for a line that is silent since `since`.
+  /// Makes a timer for a line that has been silent since the time `since`.
   explicit Silence(Time since) : since_(since) {}
 
   /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
@@ -23,7 +23,7 @@ class Silence {
   }
   /// Records activity that did not reach this end as an item: the line is silent since `at`.
   void busy(Time at) { since_ = at; }
-  /// Records that `silence` was reported.
+  /// Records that the event `silence` was reported, so that it is reported only once.
   void reported() { reported_ = true; }
 
   /// Returns the time since which the line is silent.

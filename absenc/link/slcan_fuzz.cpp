@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds arbitrary bytes as an adapter's output. A valid frame behind them must be found.
+// Feeds arbitrary bytes to the reader as the output of a CAN adapter. It must find a valid frame that follows them.
 #include "absenc/link/slcan.hpp"
 
 #include <cstddef>
@@ -24,7 +24,6 @@ void check(Bytes line) {
   if (!frame) return;
   require(frame->size <= 8 && frame->id <= (frame->extended ? 0x1FFFFFFFu : 0x7FFu));
   const slcan::LineText again = slcan::encode(*frame);
-  // `line` has no CR, and may end with a timestamp of 4 digits.
   require(again.size() - 1 == line.size() || again.size() + 3 == line.size());
   for (std::size_t i = 0; i + 1 < again.size(); ++i) require(again[i] == upper(line[i]));
 }

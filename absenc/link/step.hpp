@@ -28,7 +28,7 @@ struct Step {
 
   Kind kind = Kind::wait;  ///< requested action
   ExtraWire wire{};        ///< pulse: the wire to drive
-  /// Transfer, wait: no request of another machine may come before the next step of this machine.
+  /// Transfer, wait: until the next step of this machine, no other machine may send a request on the line.
   bool holds_line = false;
   bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   /// Transfer on a bidirectional clocked link: afterwards the clock line rests low, because the next transfer belongs
@@ -38,7 +38,8 @@ struct Step {
   std::uint8_t frame = 0;
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
-  /// Transfer on a clocked link: number of clocks; a device may set the number of bits that hosts read.
+  /// Transfer on a clocked link: number of clocks that the host gives; on the device side the number of bits that hosts
+  /// read, 0 if not stated.
   std::size_t bits = 0;
   /// Transfer on a bidirectional clocked link: the host drives the data line with `out` during this number of clocks,
   /// then it releases the line.
@@ -48,11 +49,11 @@ struct Step {
   /// Transfer, wait: `silence` is due this long after `sent` if nothing is received; 0: no limit.
   Time answer{};
   Time gap{};  ///< transfer, wait: `silence` is due this long after an item; 0: no limit
-  /// Pulse: its duration. Frames: pause between two. Clocked device: how long after the last clock edge the device
-  /// drives the data line low behind `out`.
+  /// Pulse: its duration. Transfer in frames: the pause between two frames. Clocked device: the time for which the
+  /// device drives the data line low after the last clock edge, behind the bits of `out`.
   Time width{};
 
-  /// Returns the byte that a host samples behind `out` of a device on an SPI or clocked link.
+  /// Returns the byte that a host samples after all of `out`, on an SPI or clocked link whose device sends `out`.
   [[nodiscard]] constexpr std::uint8_t behind_out() const { return width > Time{} ? 0x00 : 0xFF; }
 };
 
@@ -65,7 +66,7 @@ struct Event {
     received,  ///< `items` were received from the line
     silence,   ///< the `answer` or `gap` limit of the last step has passed
     timer,     ///< the time `at` of the last wait step was reached
-    /// Device side: chip select or first clock edge.
+    /// Device side: the host has activated chip select, or given the first clock edge.
     selected,
     triggered,  ///< device side: a pulse on `wire` has begun
     /// A damaged character or CAN frame was received, or a CAN frame could not be sent.
@@ -101,7 +102,7 @@ struct Machine {
   virtual Step<Item> next(Time now) = 0;
 
  protected:
-  ~Machine() = default;  // a public virtual destructor would link operator delete
+  ~Machine() = default;  // protected, because firmware would link operator delete for a public virtual one
 };
 
 /// A step on a line of bytes.

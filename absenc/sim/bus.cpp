@@ -8,7 +8,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Longest time by which a transfer is given to the port early; it then blocks other devices.
+// A transfer is given to the port at most this time before it begins, because it then blocks other devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.
@@ -90,14 +90,14 @@ ByteStep Bus::next(Time now) {
 }
 
 Time Bus::first_begin() const {
-  Time first = never - soon;  // no pending transfer; a caller may add `soon` to it without overflow
+  Time first = never - soon;  // far in the future; a caller may add `soon` to it without overflow
   for (const Node& node : nodes_) {
     if (node.send_state == SendState::pending) first = std::min(first, node.at);
   }
   return first;
 }
 
-// Combines pending transfers that overlap, from the first one on.
+// Combines the transfer that begins first with all pending transfers that overlap it into one.
 void Bus::merge() {
   std::vector<Node*> pending;
   for (Node& node : nodes_) {

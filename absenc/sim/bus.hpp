@@ -9,13 +9,13 @@
 
 namespace absenc::sim {
 
-/// Several devices on one half-duplex line, without bit timing; Line has that.
+/// Several devices on one half-duplex line, without bit timing, which sim::Line simulates.
 ///
 /// A device does not receive bytes that are sent together with its own. Bytes that are sent at the same time reach the
 /// line as their AND.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// The machines in `devices` must outlive the bus. `character` is the duration of one byte.
+  /// Makes a bus for the machines in `devices`, which must outlive it. `character` is the duration of one byte.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   /// Processes an event that the port reports.

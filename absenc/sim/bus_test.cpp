@@ -17,7 +17,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` a time `after` it received the byte `key` on an idle line.
+/// A device that sends `reply` when the time `after` has passed since it received the byte `key` on an idle line.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}
@@ -100,7 +100,7 @@ TEST(Bus, DeliversSameBytesAsLine) {
     std::vector<std::unique_ptr<Responder>> made;
     made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
-    // This device answers request 2 at the same time as the device before it.
+    // This device answers request 2 at the same time as the device that was made before it.
     made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));
     return made;
   };

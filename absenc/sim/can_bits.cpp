@@ -8,10 +8,10 @@ namespace absenc::sim {
 
 namespace {
 
-/// The bits of a frame that are covered by the CRC and, together with the CRC, by bit stuffing.
+/// The bits of a CAN frame that the CRC covers, and the CRC itself, with stuff bits.
 class StuffedBits {
  public:
-  /// Also writes the bits to `bits`, if it is not null.
+  /// Also appends the bits of the frame, with stuff bits, to `bits`, if it is not null.
   explicit StuffedBits(std::vector<bool>* bits) : bits_(bits) {}
 
   /// Appends the lower `count` bits of `value`, most significant first.
@@ -27,7 +27,7 @@ class StuffedBits {
   [[nodiscard]] std::size_t count() const { return count_; }
 
  private:
-  // Behind five equal bits follows a stuff bit of the other level.
+  // Appends a bit of the frame and, after five equal bits, a stuff bit of the other level.
   void put(bool bit) {
     run_ = run_ != 0 && last_ == bit ? run_ + 1 : 1;
     write(bit);
@@ -44,27 +44,27 @@ class StuffedBits {
   std::vector<bool>* bits_;
   std::size_t count_ = 0;
   std::uint16_t crc_ = 0;
-  unsigned run_ = 0;  // number of equal bits at the end; 0: there is no bit
+  unsigned run_ = 0;  // number of equal bits at the end so far; 0: no bit was appended yet
   bool last_ = false;
 };
 
-// CRC delimiter, acknowledge slot, acknowledge delimiter; the end of frame has seven recessive bits.
+// The end of a CAN frame: CRC delimiter, acknowledge slot, acknowledge delimiter, then seven recessive bits.
 constexpr std::array<bool, 10> end_bits{true, false, true, true, true, true, true, true, true, true};
 
-// Returns the number of bits before `end_bits`.
+// Appends the bits of `frame`, up to and including the CRC, to `bits` and returns their number with stuff bits.
 std::size_t put_stuffed(const CanFrame& frame, std::vector<bool>* bits) {
   StuffedBits stuffed(bits);
   stuffed.append(false);
   if (frame.extended) {
     stuffed.append(frame.id >> 18, 11);
-    stuffed.append(0b11, 2);  // the recessive bits SRR and IDE
+    stuffed.append(0b11, 2);  // the bits SRR and IDE, which are recessive (1)
     stuffed.append(frame.id & 0x3FFFF, 18);
     stuffed.append(frame.remote);
     stuffed.append(0, 2);  // the reserved bits r1 and r0
   } else {
     stuffed.append(frame.id, 11);
     stuffed.append(frame.remote);
-    stuffed.append(0, 2);  // the dominant bits IDE and r0
+    stuffed.append(0, 2);  // the bits IDE and r0, which are dominant (0)
   }
   stuffed.append(frame.size, 4);
   for (const std::uint8_t byte : frame.remote ? Bytes() : frame.bytes()) stuffed.append(byte, 8);

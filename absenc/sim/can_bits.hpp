@@ -12,10 +12,10 @@ namespace absenc::sim {
 /// Returns the bits of `frame` on the bus, with stuff bits and the acknowledge bit.
 [[nodiscard]] std::vector<bool> can_bits(const CanFrame& frame);
 
-/// Returns the number of bits that `can_bits` returns, without memory for them.
+/// Returns the number of bits that `can_bits` returns, without allocating memory.
 [[nodiscard]] std::size_t can_bit_count(const CanFrame& frame);
 
-/// Fewest recessive bits between two frames.
+/// Smallest number of recessive bits between two CAN frames.
 inline constexpr std::size_t can_intermission_bits = 3;
 
 }  // namespace absenc::sim

@@ -36,7 +36,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   using Kind = Event<std::uint8_t>::Kind;
   switch (event.kind) {
     case Kind::received:
-      // The end of a request whose beginning was ignored is ignored too.
+      // Bytes that arrive shortly after ignored ones are the end of the same request, and are ignored too.
       if (ignores_line_ || event.at - last_ignored_at_ <= 2 * device_gap_) {
         last_ignored_at_ = event.at;
       } else {
@@ -47,7 +47,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
       if (ignores_line_) return;
       break;
     case Kind::silence:
-      if (silent_until_ != never) return;  // the device waits for the `sent` of a suppressed reply
+      if (silent_until_ != never) return;  // the device waits for the `sent` event of a suppressed reply
       break;
     case Kind::sent:
       ignores_line_ = false;
@@ -112,7 +112,7 @@ bool FaultyDevice::strikes(FaultKind kind) {
   return true;
 }
 
-// Applies random faults to `reply`. Returns false when nothing is to be sent.
+// Applies random faults to `reply`. Returns false if no reply is to be sent.
 bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   const std::vector<std::uint8_t> request = std::exchange(request_, {});
   const auto faults_before = counts_;
@@ -120,7 +120,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   if (strikes(FaultKind::silence)) reply_.clear();
   if (!reply_.empty()) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
-    // On a clocked link corrupt, truncate and drop hit only bytes that the host clocks out.
+    // On a clocked link the faults corrupt, truncate and drop hit only bytes that the host clocks out.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
     if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()), random_);
     const std::size_t each = rates_.character_bytes;

@@ -23,14 +23,14 @@ enum class FaultKind : std::uint8_t {
   garbage,          ///< 1 to 4 random characters are sent before the reply
   silence,          ///< the reply is not sent
   repeat,           ///< the reply is sent twice
-  request_corrupt,  ///< 1 to 3 bits of a byte that the device receives are flipped
+  request_corrupt,  ///< 1 to 3 bits of a received byte are flipped before the device gets it
 };
 
 /// Names of the fault kinds, indexed by FaultKind.
 inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt", "truncate", "delay",          "echo",
                                                              "garbage", "silence", "repeat",   "request_corrupt"};
 
-/// Number of injected faults, indexed by FaultKind.
+/// Number of injected faults of each kind, indexed by FaultKind.
 using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
 /// Probabilities of the injected faults, and the `delay` of late replies.
@@ -38,7 +38,7 @@ struct FaultRates {
   /// Probability of each fault, 0 to 1, indexed by FaultKind.
   std::array<double, fault_names.size()> rates{};
   Time delay = std::chrono::microseconds(200);  ///< additional delay of a late reply
-  /// Bytes of a character, 1 or 2: drop, truncate and garbage remove or add whole characters.
+  /// Number of bytes that one character carries, 1 or 2: drop, truncate and garbage remove or add whole characters.
   std::uint8_t character_bytes = 1;
 
   /// Returns the probability of faults of this kind; a reference that can be assigned to.
@@ -59,7 +59,7 @@ struct FaultRate {
 /// Flips 1 to 3 different random bits of `bytes`, which must not be empty.
 void flip_bits(std::span<std::uint8_t> bytes, Random& random);
 
-/// A machine between a line and a device machine that injects faults. The device must outlive it.
+/// A machine that stands between a line and the machine of a device, and injects faults. The device must outlive it.
 ///
 /// All faults but `request_corrupt` strike what the device sends: on character links a reply, on clocked links the bits
 /// that the device drives. A reply that a fault makes longer or later does not follow the device's own timing.
@@ -93,16 +93,16 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   FaultCounts counts_{};
   std::uint64_t damaged_replies_ = 0;
 
-  std::vector<std::uint8_t> request_;  // bytes received since the last reply, the first 256
+  std::vector<std::uint8_t> request_;  // the first 256 bytes that were received since the last reply
   std::vector<std::uint8_t> reply_;
   std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
-  // Whether received bytes are ignored, because the device does not expect them now.
+  // Whether received bytes are ignored, because the device is sending a changed reply and expects no request.
   bool ignores_line_ = false;
-  Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte that was ignored
+  Time last_ignored_at_ = -std::chrono::hours(1);  // time at which a byte was last ignored
   Time device_gap_{};                              // longest `gap` that the device has requested so far
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
-  Time device_timer_ = never;                      // time of the timer that the device requested
+  Time device_timer_ = never;                      // time of the `timer` event that the device has requested
 };
 
 }  // namespace absenc::sim

@@ -24,13 +24,13 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// A device that answers every two bytes 3 us later, and counts events that it must not get.
+// A device that answers every two bytes 3 us later, and counts violations: events that a port must not report to it.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Kind::sent) sending = false;
     if (event.kind == Kind::timer) ++timers;
-    // A `silence` during a transfer is a violation by the port.
+    // Counts a violation by the port: a `silence` during a transfer.
     if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
@@ -204,7 +204,7 @@ TEST_F(Faults, WholeCharactersOfTwoBytesAreLostOrAdded) {
 
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // the device's timer must still expire
+  device.timer_at = microseconds(500);  // the device's `timer` event must still be reported
   EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -222,7 +222,7 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// The next request may arrive before the delayed or repeated reply has ended.
+// The host may send its next request before a delayed or repeated reply has ended.
 TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -242,7 +242,7 @@ TEST_F(Faults, StretchedReplyCausesNoViolation) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// The device takes the first half of a damaged request for all of it, and answers too early.
+// The device takes the first half of a damaged request for a whole request, and answers too early.
 TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
@@ -270,7 +270,7 @@ TEST_F(Faults, EarlyRequestIsAViolation) {
   damage(FaultKind::corrupt);
   host.send_now = true;
   line.wake(node);
-  line.run_until(microseconds(40));  // at 40 us the reply has begun
+  line.run_until(microseconds(40));  // at 40 us the reply has begun, so a request now is too early
   host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(1000));

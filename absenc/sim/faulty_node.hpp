@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual CAN node with injected faults, in frames that it sends or receives.
+// A virtual CAN node with injected faults in the frames that it sends or receives.
 #pragma once
 
 #include <deque>
@@ -8,9 +8,9 @@
 
 namespace absenc::sim {
 
-/// A machine between a CAN bus and a device that injects faults. The device must outlive it. The faults are like those
-/// of FaultRates, with a frame in place of a reply. They model a node with faulty software: on a real bus the CAN
-/// checksum would discard frames damaged on the wire.
+/// A machine that stands between a CAN bus and a device, and injects faults. The device must outlive it. The faults are
+/// like those of FaultRates, with a frame in place of a reply. They model a node with faulty software: on a real bus
+/// the CAN checksum would discard frames damaged on the wire.
 class FaultyNode final : public Machine<CanFrame> {
  public:
   /// Injects faults between `device` and its bus. The same seed gives the same faults.
@@ -25,7 +25,7 @@ class FaultyNode final : public Machine<CanFrame> {
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Returns the number of transfers with at least one fault; `request_corrupt` does not count.
+  /// Returns the number of the device's transfers with at least one fault; `request_corrupt` does not count.
   [[nodiscard]] std::uint64_t damaged_frames() const { return damaged_; }
 
  private:

@@ -64,7 +64,7 @@ void FrameBus::serve(Node& node, Time now) {
         break;
       case FrameStep::Kind::configure:
         node.rate = step.rate;
-        // The bus changes its rate when the last of its nodes has changed to the new rate.
+        // The bus changes its bit rate when the last of its nodes has changed to the new rate.
         if (std::all_of(nodes_.begin(), nodes_.end(), [&](const Node& one) { return one.rate == node.rate; })) {
           rate_ = node.rate;
           configuring_ = true;

@@ -13,7 +13,8 @@ namespace absenc::sim {
 /// node with another bit rate than the bus neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
-  /// The machines in `nodes` must outlive the bus. `rate`: first bit rate of the port and the nodes.
+  /// Makes a bus of the machines in `nodes`, which must outlive it. `rate`: bit rate of the port and of all nodes at
+  /// the start, in bits per second.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
   /// Processes an event that the port reports.

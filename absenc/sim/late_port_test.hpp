@@ -15,7 +15,8 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay` returns the delay of the items after a request, or `never` if they are lost.
+  /// Makes a port behind `inner`. `delay` is called for each request and returns the delay of the items received after
+  /// it, or `never` if they are lost.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {
@@ -26,7 +27,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // Stores the items that arrive before the transfer begins.
+      // Stores the items that arrive before the next transfer begins.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;

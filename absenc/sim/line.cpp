@@ -119,7 +119,8 @@ bool Line<Item>::step() {
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
-  // Order at one time: scheduled events, timers and silences, arbitration of CAN frames.
+  // Events with the same time are handled in this order: scheduled events, timers and silences, arbitration of CAN
+  // frames.
   const Node late = next_deadline();
   if (scheduled_.empty() || scheduled_.top().at > time ||
       (scheduled_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
@@ -146,7 +147,7 @@ bool Line<Item>::step() {
     case Kind::finished:
       if (current) finish(node);
       break;
-    case Kind::frame:  // the bus becomes free even if the machine of the sender was replaced
+    case Kind::frame:  // the CAN bus becomes free even if the machine of the sender was replaced
       frame_on_bus_ = false;
       if (current) end_frame(node);
       schedule(Kind::arbitrate, now_, node);
@@ -214,7 +215,7 @@ void Line<Item>::serve(Node node) {
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
-  // A device selected by chip select or clock answers into the transfer in progress.
+  // On an SPI or clocked link a device answers into the transfer that is in progress.
   const bool driven = state.role == NodeRole::device && step.kind == Step<Item>::Kind::transfer && host_clocks(kind_);
   if (!driven && state.active_step != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
@@ -234,7 +235,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.goes_on = step.goes_on;
   state.accepted_at = now_;
   ++state.begin_generation;
-  // The begin is scheduled, so that a node that is attached next, at the same time, takes part.
+  // The begin is scheduled even for the present time, so that a node that is attached after this call still takes part.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 

@@ -13,7 +13,7 @@
 
 namespace absenc::sim {
 
-/// Whether a node is host or device.
+/// The two roles of a node: host or device.
 enum class NodeRole : std::uint8_t { host, device };
 
 /// One shared line with the machines on it.
@@ -35,8 +35,8 @@ class Line {
   /// One transfer of SPI bytes or clocked bits. The last byte is left-aligned.
   struct Transfer {
     Time start;                 ///< spi: time of chip select; clocked: time of the first clock edge
-    Time end;                   ///< End of the last bit.
-    std::size_t bits;           ///< number of clocks; spi: eight per byte
+    Time end;                   ///< End of the last bit of the transfer.
+    std::size_t bits;           ///< number of clocks of the transfer; SPI has eight per byte
     std::span<const Item> out;  ///< Items that the host sent.
     std::span<const Item> in;   ///< Items that the host received.
     Time lead{};                ///< Time from chip select to the first clock.
@@ -64,7 +64,7 @@ class Line {
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the steps of the node's machine. Needed after a change of the machine without an event.
+  /// Takes the steps of the node's machine. Call it after the machine was changed by something else than an event.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
@@ -98,9 +98,10 @@ class Line {
   struct ScheduledEvent {
     enum class Kind : std::uint8_t { begin, character, frame, turned, transferred, finished, arbitrate } kind;
     Time at;
-    std::uint64_t order;  // events of the same time are handled in this order, but `arbitrate` last
+    // events with the same time are handled in ascending `order`, but `arbitrate` after all others
+    std::uint64_t order;
     Node node;
-    // `begin_generation` of the node when the event was scheduled.
+    // `begin_generation` of the node when the event was scheduled: after a newer transfer the event no longer counts.
     std::uint64_t generation;
     bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;
@@ -143,7 +144,8 @@ class Line {
   TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;
   bool frame_on_bus_ = false;
-  // Items of the transfer, and senders of the frame, that ends now; kept here, so that a line in use allocates nothing.
+  // Items of the SPI or clocked transfer, and senders of the CAN frame, that ends now; members, so that a line in use
+  // allocates nothing.
   std::vector<Item> transferred_in_{};
   std::vector<Item> transferred_out_{};
   std::vector<Node> frame_senders_{};

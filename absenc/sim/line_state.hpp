@@ -10,9 +10,9 @@
 
 namespace absenc::sim {
 
-/// Returns the character on a line that two senders drive at once: 0 bits win.
+/// Returns the character on a line that two senders drive at once: a bit is 0 if it is 0 in either.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
-/// Returns `a`. CAN frames are arbitrated, never combined.
+/// Returns `a`, because CAN frames are arbitrated and never combined.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
 /// State of one node of a line.
@@ -32,21 +32,23 @@ struct Line<Item>::State {
 
   /// The sender whose character this node's receiver is synchronised to.
   Node framed_sender = 0;
-  Time framed_from = never;  ///< Time at which the character of `framed_sender` begins.
-  Time framed_until{};       ///< Time at which the character of `framed_sender` ends.
+  Time framed_from = never;  ///< Begin of the character that this node's receiver is synchronised to.
+  Time framed_until{};       ///< End of the character that this node's receiver is synchronised to.
 
-  /// Kind of the step that is pending or in progress, transfer or pulse; wait: none.
+  /// Kind of the step in progress or about to begin: transfer or pulse; wait if there is none.
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
-  std::uint64_t begin_generation = 0;  ///< number of transfers, pulses and replaced machines so far
-  bool begun = false;                  ///< whether `active_step` has begun, if sent in frames: its present frame
-  std::vector<Item> out;               ///< items of the transfer that the node sends
-  std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
-  std::size_t frame = 0;               ///< number of items of each frame of `out`; 0: one frame
-  std::size_t expect = 0;              ///< number of items that the node expects
-  Time width{};                        ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
-  std::uint8_t behind_out = 0xFF;      ///< spi, clocked: byte that the host samples after `out` has ended
-  bool hold_low = false;               ///< clocked: the host holds the clock line low before the transfer
-  std::size_t out_bits = 0;            ///< bidirectional clocked, host: number of clocks during which it drives `out`
+  /// counts the node's transfers, pulses and replaced machines, to recognise stale events
+  std::uint64_t begin_generation = 0;
+  /// whether the transfer or pulse has begun; of a transfer in frames: whether its present frame has
+  bool begun = false;
+  std::vector<Item> out;           ///< items of the transfer that the node sends
+  std::size_t bits = 0;            ///< spi, clocked: number of bits of the transfer
+  std::size_t frame = 0;           ///< number of items of each frame of `out`; 0: one frame
+  std::size_t expect = 0;          ///< number of items that the node expects
+  Time width{};                    ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
+  std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
+  bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
+  std::size_t out_bits = 0;        ///< bidirectional clocked, host: number of clocks during which it drives `out`
   /// Bidirectional clocked, host: whether the clock line rests low behind the transfer.
   bool goes_on = false;
   /// Bidirectional clocked, host: end of the last transfer, if the present one belongs to its exchange; else `never`.
@@ -67,7 +69,7 @@ struct Line<Item>::State {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }
 
-  /// Returns `item` combined with characters of this node that overlap [from, to).
+  /// Returns `item` combined with the characters of this node that are on the line between `from` and `to`.
   [[nodiscard]] Item overlaid(Item item, Time from, Time to) const {
     if (each.count() == 0) return item;
     const auto first = static_cast<std::size_t>(std::max<std::int64_t>(0, (from - start) / each));

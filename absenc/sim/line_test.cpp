@@ -17,7 +17,7 @@ namespace {
 using std::chrono::microseconds;
 using Byte = std::uint8_t;
 
-// A machine that returns the step in `todo` once, and waits otherwise.
+// A machine that returns the step in `todo` once, and then waits.
 class Puppet final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
@@ -89,7 +89,7 @@ TEST_F(LineTest, ReplaceAfterDone) {
   line.wake(host_node);
   EXPECT_TRUE(line.done(host_node));
   host.todo = send_two;
-  line.wake(host_node);  // a machine that is done is not asked for further steps
+  line.wake(host_node);  // the line does not ask a machine that is done for further steps
   EXPECT_EQ(line.next_event(), never);
   line.replace(host_node, host);
   EXPECT_FALSE(line.done(host_node));

@@ -13,14 +13,15 @@ namespace absenc::sim {
 
 namespace {
 
-// A UART samples the stop bit in its middle, so the rates may differ by 5 %.
+// Returns whether a UART with settings `a` receives characters sent with `b`. It samples the stop bit in its middle, so
+// the rates may differ by 5 %.
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
   return difference * 20 <= larger && a.parity == b.parity && a.data_bits == b.data_bits;
 }
 
-// The lower number wins the arbitration.
+// Returns the number that decides the arbitration of a CAN frame: the lowest wins.
 std::uint32_t arbitration_field(const CanFrame& frame) {
   const std::uint32_t remote = frame.remote ? 1 : 0;
   if (!frame.extended) return frame.id << 21 | remote << 20;
@@ -115,7 +116,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // the receiver is synchronised to another character, and the line is not silent
+    } else {  // the receiver is synchronised to the character of another sender, and the line is not silent
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -134,7 +135,7 @@ void Line<Item>::deliver(Node node, Node sender, const Item& item, bool garbled)
   }
 }
 
-// All items of an SPI or clocked transfer move at once; only the duration is simulated.
+// All items of an SPI or clocked transfer are exchanged at its end; in between only its duration is simulated.
 template <class Item>
 void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
@@ -269,7 +270,7 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Frames with the same arbitration field that began together are all lost if they differ.
+    // CAN frames that began together with the same identifier are all lost if their data differ.
     std::vector<Node>& senders = frame_senders_;
     senders.clear();
     bool clash = false;

@@ -18,14 +18,14 @@ namespace absenc::sim {
 
 namespace {
 
-constexpr double revolution = 4294967296.0;  // position units per revolution, 2^32
+constexpr double revolution = 4294967296.0;  // number of position units in a revolution: 2^32
 
 struct Quotient {
   std::uint64_t whole;
   std::uint64_t remainder;
 };
 
-// The divisor must be below 2^63.
+// Returns quotient and remainder of a * b / divisor. The divisor must be below 2^63.
 Quotient multiply_divide(std::uint64_t a, std::uint64_t b, std::uint64_t divisor) {
   const std::uint64_t a_whole = a / divisor;
   const std::uint64_t a_remainder = a % divisor;
@@ -62,7 +62,7 @@ std::int32_t saturated(double value) {
   return static_cast<std::int32_t>(std::lround(std::clamp(value, -limit, limit)));
 }
 
-// Blanks, tabs and CRs around the number are allowed.
+// Returns the number in `text`, or nothing if it is none. Blanks, tabs and CRs around the number are allowed.
 std::optional<double> number(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) return {};
@@ -87,7 +87,7 @@ std::optional<Motion::Knot> knot(std::string_view line) {
   if (comma == std::string_view::npos) return {};
   const auto seconds = number(line.substr(0, comma));
   const auto degrees = number(line.substr(comma + 1));
-  // With these limits, the difference of two values cannot overflow.
+  // With these limits of time and angle, the difference between two points of the path cannot overflow.
   if (!seconds || !degrees || std::abs(*seconds) > 4e9 || std::abs(*degrees) > 3.8e11) return {};
   return Motion::Knot{Time(std::llround(*seconds * 1e9)), std::llround(*degrees / 360 * revolution)};
 }
@@ -152,13 +152,13 @@ ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
   // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), numerator and denominator divided by 2^17.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
-  constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17, exact
+  constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17, without rounding
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),
           saturated(static_cast<double>(speed.micro_rpm) / 1e3), 0};
 }
 
 ShaftState Motion::offset_at(const Sine& sine, Time time) {
-  // Whole periods are removed exactly, so that the phase is as accurate after a day as at first.
+  // Whole periods of the sine are removed exactly, so that its phase is as accurate after a day as in the first second.
   constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // one period of the sine in micro-hertz * ns
   const auto phase = multiply_divide(sine.micro_hertz, magnitude(time.count()), one_period).remainder;
   const double turn = static_cast<double>(phase) / static_cast<double>(one_period);

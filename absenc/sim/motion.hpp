@@ -17,7 +17,7 @@ class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.
   struct Knot {
-    Time time;              ///< time of the point
+    Time time;              ///< time at which the shaft reaches the point
     std::int64_t position;  ///< position relative to the start position, unit 2^-32 revolution
   };
 
@@ -29,7 +29,8 @@ class Motion final : public Shaft {
   /// std::invalid_argument outside 0 to 36 000 000 degrees or 0 to 10 000 Hz.
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
   /// Returns a motion in straight lines between points `seconds,degrees`, one per line, seconds rising; degrees are
-  /// relative to `start`. Lines that begin with # are skipped. Throws std::invalid_argument with `name`.
+  /// relative to `start`. Lines that begin with # are skipped. Throws std::invalid_argument, whose text names the file
+  /// as `name`.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
   /// Starts the motion at `time`; until then the shaft rests.
@@ -46,7 +47,7 @@ class Motion final : public Shaft {
     std::int64_t micro_rpm;
   };
   struct Sine {
-    double amplitude;  // amplitude in revolutions
+    double amplitude;  // amplitude of the sine in revolutions
     std::uint64_t micro_hertz;
   };
   struct Path {

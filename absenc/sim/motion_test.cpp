@@ -50,7 +50,7 @@ TEST(Motion, ConstantSpeedIsExactAfterADay) {
 }
 
 TEST(Motion, ConstantSpeedWrapsInsteadOfOverflowing) {
-  // At this speed the position reaches 2^31 revolutions after 35.8 h.
+  // At 1 000 000 rpm the position reaches 2^31 revolutions after 35.8 h.
   const Motion motion = Motion::constant_speed(0, 1'000'000);
   const auto wrapped = static_cast<std::int64_t>(60'000'000'000u * static_cast<std::uint64_t>(revolution));
   EXPECT_EQ(motion.at(1000h).position, wrapped);
@@ -61,7 +61,7 @@ TEST(Motion, BeginsAtSetTime) {
   motion.begin_at(5s);
   EXPECT_EQ(motion.at(3s).position, 0);
   EXPECT_EQ(motion.at(5s).position, 0);
-  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on at this time starts at rest
+  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on when the motion begins starts at rest
   EXPECT_EQ(motion.at(6s).position, revolution);
   EXPECT_EQ(motion.at(6s).speed_millirpm, 60'000);
 }
@@ -69,10 +69,11 @@ TEST(Motion, BeginsAtSetTime) {
 TEST(Motion, SineHasExactPhaseAndDerivatives) {
   const Motion motion = Motion::sine(0, 90, 0.5);
   EXPECT_EQ(motion.at(0s).position, 0);
-  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // amplitude pi/2 rad * pi rad/s = 47.1239 rpm
+  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // amplitude of the speed: pi/2 rad * pi rad/s = 47.1239 rpm
   EXPECT_EQ(motion.at(500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(500ms).speed_millirpm, 0);
-  EXPECT_EQ(motion.at(500ms).acceleration, -16);  // amplitude pi/2 rad * (pi rad/s)^2 = 15.50 rad/s^2
+  // amplitude of the acceleration: pi/2 rad * (pi rad/s)^2 = 15.50 rad/s^2
+  EXPECT_EQ(motion.at(500ms).acceleration, -16);
   EXPECT_EQ(motion.at(24h + 500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(-500ms).position, -revolution / 4);
   EXPECT_EQ(motion.at(-500ms).acceleration, 16);
@@ -87,7 +88,7 @@ TEST(Motion, DerivativesAgreeWithPositions) {
       const double rpm = (after - before) / static_cast<double>(revolution) / 10e-6 * 60;
       EXPECT_NEAR(motion.at(time).speed_millirpm, rpm * 1e3, 2);
       const double radians = (after - 2 * here + before) / static_cast<double>(revolution) * 6.283185307;
-      // Rounded positions change the second difference by up to 2 units, which are 117 rad/s^2.
+      // Rounding of the positions changes the second difference by up to 2 units, which are 117 rad/s^2.
       EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);
     }
   }

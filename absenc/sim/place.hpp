@@ -13,7 +13,7 @@ namespace absenc::sim {
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
   const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
   if (bits == 0) return 0;
-  // With more than 32 bits, the bits that `position` does not have are 0.
+  // If the encoder has more than 32 bits, those finer than 2^-32 revolution are 0.
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 
@@ -31,7 +31,7 @@ namespace absenc::sim {
   return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
 }
 
-/// Returns whether two readings agree in position and turns, as far as both have them.
+/// Returns whether two readings agree in position and turns. A part that one of them lacks is not compared.
 [[nodiscard]] constexpr bool same_place(const std::optional<Reading>& one, const std::optional<Reading>& other) {
   if (!one || !other) return true;
   if (one->singleturn_valid_bits != 0 && other->singleturn_valid_bits != 0 && one->singleturn != other->singleturn) {

@@ -8,7 +8,7 @@
 namespace absenc::sim {
 namespace {
 
-// https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64, for seed 1234567
+// The expected numbers are from https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64, for seed 1234567.
 TEST(Random, NumbersAreThePublishedOnes) {
   Random random(1234567);
   EXPECT_EQ(random.next(), 6457827717110365317u);
@@ -26,7 +26,7 @@ TEST(Random, BelowReachesEveryNumberEquallyOften) {
 
 TEST(Random, BelowIsNotSkewedByAHugeLimit) {
   Random random(2);
-  // With this limit, plain `value % limit` would make the lower third twice as likely.
+  // With the limit 3 * 2^62, plain `value % limit` would make the lower third twice as likely.
   const std::uint64_t limit = std::uint64_t{3} << 62;
   int lower_third = 0;
   for (int i = 0; i < 30'000; ++i) lower_third += random.below(limit) < limit / 3 ? 1 : 0;

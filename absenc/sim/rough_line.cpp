@@ -14,7 +14,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Mostly `to` had as many items before, so resize rarely allocates.
+// Copies `items` to `to`, which mostly had as many items before, so that resize rarely allocates.
 template <class Item>
 void copy(std::span<const Item> items, std::vector<Item>& to) {
   to.resize(items.size());
@@ -91,7 +91,7 @@ void RoughLine<Item>::deliver_request(std::span<const Item> request) {
   feed({.kind = Kind::received, .at = time_, .items = request});
 }
 
-// The device's reply is complete at the end of the transfer.
+// Exchanges the items of a transfer; on SPI and clocked links the device's reply is complete at its end.
 template <class Item>
 void RoughLine<Item>::transfer(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -336,7 +336,7 @@ void RoughLine<Item>::draw_skip() {
     skip_ = 0;
     return;
   }
-  // One is added so that `chance` is never 0, whose logarithm is infinite.
+  // One is added to the random number so that `chance` is never 0, whose logarithm is infinite.
   const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;
   skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
 }
@@ -414,7 +414,7 @@ void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (talked) add_other_sender(items);
   struck = struck || talked;
   if constexpr (std::is_same_v<Item, CanFrame>) {
-    if (struck) items.clear();  // the CAN controllers detect the damage, and no node receives the frame
+    if (struck) items.clear();  // on CAN the controllers detect the damage, and no node receives the frame
   }
   if (rates_.doubled > 0 && random_.chance(rates_.doubled) && !items.empty()) {
     double_item(items, count);

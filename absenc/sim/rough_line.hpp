@@ -12,12 +12,13 @@
 
 namespace absenc::sim {
 
-/// Probabilities, 0 to 1, of damage to data for the host: `bit` per bit, the others per frame.
+/// Probabilities, 0 to 1, of damage to what the host receives: `bit` is per bit, the others are per frame.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
-  /// Probability that some of 2 to 16 adjacent bits are flipped.
+  /// Probability that some bits in a row of 2 to 16 bits are flipped.
   double burst = 0;
-  /// Probability that a byte or CAN frame arrives twice; on SPI and clocked links a bit, and the last one is lost.
+  /// Probability that a byte or CAN frame arrives twice; on SPI and clocked links one bit arrives twice and the last
+  /// bit is lost.
   double doubled = 0;
   /// Probability that another sender sends random bytes during the frame, perhaps past its end.
   double talker = 0;
@@ -26,10 +27,10 @@ struct RoughRates {
 
 /// Counts of the requests, the replies and the disturbances of a rough line.
 struct RoughCounts {
-  std::uint64_t requests = 0;  ///< transfers and pulses of the host
-  std::uint64_t replies = 0;   ///< frames sent to the host
-  std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
-  std::uint64_t late = 0;      ///< frames that were delayed
+  std::uint64_t requests = 0;  ///< number of transfers and pulses of the host
+  std::uint64_t replies = 0;   ///< frames that the device sent to the host
+  std::uint64_t damaged = 0;   ///< number of frames that were damaged by any fault except `late`
+  std::uint64_t late = 0;      ///< number of frames that were delayed
 };
 
 /// A line that damages frames to the host at random. A frame arrives in one piece at its end; use Line for collisions
@@ -46,11 +47,11 @@ class RoughLine final : public Port<Item> {
 
   [[nodiscard]] Time now() override;
   void begin(const Step<Item>& step) override;
-  /// Throws std::logic_error if no event can ever end the wait.
+  /// Blocks until the next event. Throws std::logic_error if no event can ever end the wait.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
   /// Advances the time to `until` while the host is not waiting.
   void rest(Time until);
-  /// Discards frames that have arrived but were not reported.
+  /// Discards frames that have arrived but were not yet reported to the host.
   void drop();
 
   /// Marks all frames that the device began to send before now as old.
@@ -69,7 +70,7 @@ class RoughLine final : public Port<Item> {
  private:
   // A frame in transit to the host; without items it arrives as a `line_error`.
   struct InTransit {
-    Time sent;   // time at which its transmission began
+    Time sent;   // time at which the transmission of the frame began
     Time first;  // arrival time of the first item
     Time at;     // arrival time of the whole frame
     std::vector<Item> items;
@@ -114,7 +115,7 @@ class RoughLine final : public Port<Item> {
   Random random_;
   RoughRates rates_{};
   RoughCounts counts_{};
-  std::uint64_t skip_ = ~std::uint64_t{0};  // number of good bits before the next flipped bit
+  std::uint64_t skip_ = ~std::uint64_t{0};  // number of undamaged bits before the next flipped bit
 
   Time time_{};
   Time last_event_at_{};
@@ -123,15 +124,16 @@ class RoughLine final : public Port<Item> {
   std::uint32_t device_rate_;
   Side side_;
   std::vector<Item> request_;
-  std::vector<Item> out_;  // items that the device sent last
+  std::vector<Item> out_;  // items that the device sent in its last frame
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
   // Bidirectional clocked links: clocks of the present exchange so far, and clocks of it before the first bit of
   // `out_`.
   std::size_t clocks_ = 0;
   std::size_t driven_from_ = 0;
-  bool goes_on_ = false;               // bidirectional clocked links: the next transfer belongs to the same exchange
-  std::vector<InTransit> in_transit_;  // entries front_ to back_ - 1 are in transit; the others are reused
+  bool goes_on_ = false;  // bidirectional clocked links: the next transfer belongs to the same exchange
+  // ring buffer: the entries front_ to back_ - 1 are in transit, the others are reused
+  std::vector<InTransit> in_transit_;
   std::size_t front_ = 0;
   std::size_t back_ = 0;
   std::vector<Item> reported_items_;

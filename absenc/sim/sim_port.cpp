@@ -91,7 +91,7 @@ void SimPort<Item>::begin(const Step<Item>& step) {
 
 template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
-  // With a real-time clock the line may already have passed the time of the requested timer.
+  // If virtual time follows a real-time clock, the line may already have passed the time of the requested timer.
   const bool is_past = step.at > last_event_at_ && step.at <= line_.now();
   if (host_end_.empty() && is_past) host_end_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
   if (host_end_.empty()) advance(step);
@@ -103,7 +103,7 @@ Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
 
 template <class Item>
 void SimPort<Item>::advance(const Step<Item>& step) {
-  // The limits of silence apply only during this wait.
+  // The `answer` and `gap` limits of a step apply only during the wait for which they were given.
   struct Disarm {
     SimPort& port;
     ~Disarm() {

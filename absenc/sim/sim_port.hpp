@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host's end of a simulated line as a Port.
+// A Port for the host's end of a simulated line.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace absenc::sim {
 struct RealTime {
   /// Function that returns the time of the clock.
   std::function<Time()> now;
-  /// Sleeps until the given time of the clock, or less. May throw to end a wait.
+  /// Sleeps until the given time of the clock, or wakes up earlier. May throw to end a wait.
   std::function<void(Time)> sleep_until;
 };
 
@@ -23,11 +23,12 @@ struct RealTime {
 template <class Item>
 class SimPort final : public Port<Item> {
  public:
-  /// Makes a line to `device`, which must outlive the port. Throws std::invalid_argument.
+  /// Makes a line to `device`, which must outlive the port. Throws std::invalid_argument if only one function of
+  /// `real_time` is set.
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;
-  /// Begins a step. A transfer or pulse waits until an abandoned one has been sent.
+  /// Begins a step. A transfer or pulse is delayed until an abandoned earlier one has been sent.
   void begin(const Step<Item>& step) override;
   /// Blocks until the next event. Without a RealTime, throws std::logic_error if none can come.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
@@ -53,7 +54,7 @@ class SimPort final : public Port<Item> {
     void push(const Event<Item>& event);
     /// Takes out the oldest event and swaps its items with `items`.
     Event<Item> pop(std::vector<Item>& items);
-    /// Removes all events `sent`.
+    /// Removes all queued events of kind `sent`.
     void drop_sent();
 
     Step<Item> waiting{};
@@ -63,7 +64,7 @@ class SimPort final : public Port<Item> {
    private:
     QueuedEvent& queued(std::size_t number);
 
-    // A ring, whose elements keep their memory, so that a port in use allocates none.
+    // A ring buffer of events. Its elements keep their memory, so that a port in use allocates none.
     std::vector<QueuedEvent> ring_;
     std::size_t first_ = 0;
     std::size_t queued_ = 0;
@@ -75,12 +76,12 @@ class SimPort final : public Port<Item> {
   void run_until(const Done& done);
 
   RealTime real_time_;
-  Time start_{};          // start of virtual time, on the caller's clock
+  Time start_{};          // time of the caller's clock at which virtual time begins
   Time last_event_at_{};  // time of the last reported event, or of a later call of `now`
   Line<Item> line_;
   HostEnd host_end_;
   typename Line<Item>::Node host_node_;
-  std::vector<Item> items_;  // items of the last returned event
+  std::vector<Item> items_;  // items of the event that was returned last
 };
 
 extern template class SimPort<std::uint8_t>;

@@ -177,13 +177,13 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
     EXPECT_EQ(port.wait(impatient).kind, Kind::sent);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
-    world.clock += microseconds(1000);  // no silence is reported for the step before the pause
+    world.clock += microseconds(1000);  // the caller is busy for 1 ms; limits of silence do not run in this time
     (void)port.now();
   }
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// The configure step advances the line to the present, here past the time of the timer.
+// The configure step advances the line to the present, which is here later than the requested timer.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

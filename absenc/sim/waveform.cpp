@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Indices of the wires of each kind of link, in the order in which the constructor names them.
+// Indices of the wires of each kind of link, in the order in which the constructor of Waveform lists them.
 constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
@@ -72,7 +72,8 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
 void Waveform::observe(Line<std::uint8_t>& observed) {
   observed.observe([this, &observed](std::size_t sender, Time start, Time end, std::uint8_t byte) {
     this->byte(observed.role(sender), start, end, byte);
-    // A character of two bytes is drawn after its second one, from the begin of the first.
+    // A character of two bytes is drawn when its second byte is known. The drawing begins at the begin of the first
+    // byte.
     settle(std::min({observed.settled(), first_bytes_[0].start, first_bytes_[1].start}));
   });
   observed.observe_transfers([this, &observed](const Line<std::uint8_t>::Transfer& seen) {
@@ -106,7 +107,7 @@ std::size_t Waveform::data_wire(NodeRole sender) const {
   return kind_ == LinkKind::half_duplex ? line : sender == NodeRole::host ? host : device;
 }
 
-// Draws a byte; the two bytes of one character are drawn with the second one.
+// Draws a byte. If a character carries two bytes, both are drawn when the second one is added.
 void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   if (settings_.character_bytes() == 1) return character(sender, start, end, byte);
   FirstByte& first = first_bytes_[data_wire(sender)];
@@ -118,7 +119,7 @@ void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   first = {sender, start, end, byte};
 }
 
-// The second byte was never sent: the line rests at 1 instead.
+// Draws a character of two bytes whose second byte was never sent: the line rests at 1 in its place.
 void Waveform::draw_lone(FirstByte& first) {
   if (first.start == never) return;
   const Time start = std::exchange(first.start, never);
@@ -169,7 +170,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const EvenDivision half{seen.start, seen.end - seen.start, 2 * bits};
-  // A clock line that the host held low rises half a period before the first clock edge.
+  // If the host held the clock line low, it rises half a period before the first clock edge.
   if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
   for (std::int64_t i = 0; i < bits; ++i) {

@@ -33,7 +33,7 @@ class Waveform {
   };
   /// Receiver of level changes and of comments, each in the order of time.
   struct Sink {
-    /// Receives a level change of the wire with this index in `wires()`.
+    /// Receives a level change of the wire that has the index `wire` in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;
     /// Receives a description of one drawn item in words.
     virtual void comment(Time at, std::string_view words) = 0;
@@ -50,7 +50,7 @@ class Waveform {
   /// Draws all frames on `line` from now on and replaces its observer. The waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
-  /// Draws a byte; the two bytes of one asynchronous character are drawn with the second one.
+  /// Draws a byte. If an asynchronous character carries two bytes, both are drawn when the second one is added.
   void byte(NodeRole sender, Time start, Time end, std::uint8_t byte);
   /// Draws one asynchronous character with the data bits `value`.
   void character(NodeRole sender, Time start, Time end, std::uint16_t value);
@@ -72,7 +72,7 @@ class Waveform {
   [[nodiscard]] Time end() const { return end_; }
 
  private:
-  // The begin (`by` 1) or the end (-1) of a drive of a wire away from its idle level.
+  // The time from which (`by` 1) or up to which (`by` -1) a sender drives a wire away from its idle level.
   struct LevelChange {
     Time at;
     std::size_t wire;
@@ -84,10 +84,10 @@ class Waveform {
     std::string words;
   };
 
-  // The first byte of a character of two, whose second byte has not been on the line yet.
+  // The first byte of a character of two bytes, stored until its second byte is on the line.
   struct FirstByte {
     NodeRole sender{};
-    Time start = never;  // never: there is none
+    Time start = never;  // `never`: no first byte is stored
     Time end{};
     std::uint8_t byte = 0;
   };
@@ -105,11 +105,11 @@ class Waveform {
   LineSettings settings_;
   Sink* sink_;
   std::vector<Wire> wires_;
-  std::vector<int> drivers_;  // number of active drives of each wire
+  std::vector<int> drivers_;  // for each wire, the number of drives that hold it away from its idle level at present
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time
-  std::array<FirstByte, 2> first_bytes_{};  // by the index of the data wire
+  std::array<FirstByte, 2> first_bytes_{};  // stored first bytes, indexed by the wire
   Time end_{};
 };
 

@@ -74,7 +74,7 @@ TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
     // The line is low in the start bit, in the highest data bit, and in a parity bit of 0.
     const unsigned value = (1u << (data_bits - 1)) - 1;
     picture.character(NodeRole::host, 0us, settings.character(), static_cast<std::uint16_t>(value));
-    const bool parity = data_bits % 2 != 0;  // an even number of ones needs a 1
+    const bool parity = data_bits % 2 != 0;  // odd parity: the parity bit is 1 if the data have an even number of ones
     const unsigned end = data_bits + (parity ? 1 : 2);
     EXPECT_EQ(body(picture).find("#" + std::to_string(1000 * data_bits) + "\n0!\n#" + std::to_string(1000 * end) +
                                  "\n1!\n") != std::string::npos,
@@ -83,7 +83,7 @@ TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
   }
 }
 
-// Two bytes share a character; a byte without a second one is drawn with ones.
+// Two bytes share a character of 16 bits; if the second byte is missing, ones are drawn in its place.
 TEST(Waveform, DrawsTwoBytesAsOneCharacterOfSixteenBits) {
   LineSettings settings = slow;
   settings.data_bits = 16;
@@ -131,7 +131,7 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11
+    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11, with the parity bit p
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
@@ -145,7 +145,7 @@ TEST(Waveform, CollisionIsTheAnd) {
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
-  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // level changes at every bit
+  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // the level changes at every bit
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
     edges += "#" + std::to_string(edge) + '\n';
@@ -261,7 +261,7 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
 
-// Changes that are stored until the end would fill the memory.
+// Level changes go to the sink early, because those of a long drawing would fill the memory.
 TEST(Waveform, PassesSettledChangesToSink) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {
@@ -392,7 +392,7 @@ TEST_F(Sigrok, ReadsFramesOfCan) {
     waveform.frame(at, frame);
     at += settings.bits(can_bits(frame).size() + can_intermission_bits);
   };
-  add({.id = 0x000, .size = 8});  // a frame with many stuff bits
+  add({.id = 0x000, .size = 8});  // the data bytes of this CAN frame cause many stuff bits
   add({.id = 0x120, .size = 3, .data = {0x47, 0x26, 0xFF}});
   add({.id = 0x1ABCDE01, .extended = true, .size = 1, .data = {0x5A}});
   add({.id = 0x7E5, .remote = true});

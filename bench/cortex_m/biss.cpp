@@ -65,7 +65,7 @@ extern "C" [[noreturn]] void _start() {
   std::uint32_t wrong = 0;
   for (std::size_t i = 0; i < FRAMES; ++i) wrong |= position(frames[i]) ^ frames[i].position;
   register std::uint32_t status asm("r0") = wrong != 0 ? 1 : 0;
-  register std::uint32_t end asm("r7") = 1;  // number of the system call exit for ARM Linux, which qemu-arm emulates
+  register std::uint32_t end asm("r7") = 1;  // number of the system call `exit` of ARM Linux, which qemu-arm emulates
   asm volatile("svc 0" : : "r"(status), "r"(end));
   __builtin_unreachable();
 }

@@ -11,7 +11,7 @@ cd "$(dirname "$0")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# executed CPU OPTIMISATION DECODER FRAMES prints the number of executed instructions
+# executed CPU OPTIMISATION DECODER FRAMES: prints how many instructions a program executes that decodes FRAMES frames
 executed() {
   arm-none-eabi-g++ -std=c++20 "$2" -DNDEBUG -DDECODER="$3" -DFRAMES="$4" -mcpu="$1" -mthumb -ffreestanding -fno-exceptions -fno-rtti \
     -fno-threadsafe-statics -ffunction-sections -fdata-sections -Wl,--gc-sections -nostartfiles -I. ${peers:+-I"$peers"} \

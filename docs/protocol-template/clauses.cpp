@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Demands of the document on the encoder and on its host, each with its paragraph.
+// The demands of the document on the encoder and on its host, each with the paragraph that states it.
 #include <array>
 
 #include "absenc/protocol/protocol_name/unit.hpp"

@@ -34,7 +34,8 @@ Procedure set_zero(Dialog& dialog, Looked<Protocol>& found) {
 
 // ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4: bytes of its memory, which holds its zero
+// the memory of the encoder has 4 bytes, which contain its zero position
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }

@@ -44,7 +44,7 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = 50us};
   }
-  /// Returns how often a request is repeated after an error: requests that change the encoder never.
+  /// Returns how often a request is repeated after an error. Requests that change the encoder are never repeated.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
@@ -55,7 +55,7 @@ struct Protocol {
     return static_cast<std::uint8_t>(sum & 0xFF);
   }
 
-  // Request: code, address of the encoder, and their sum.
+  // A request: code, address of the encoder, and the sum of both.
   static constexpr ByteBuffer<3> encode(const Format&, const Request& request) {
     ByteBuffer<3> bytes;
     bytes.push_back(static_cast<std::uint8_t>(request.ask));
@@ -73,7 +73,7 @@ struct Protocol {
     return Request{static_cast<Ask>(bytes[0]), bytes[1]};
   }
 
-  // Reply: address of the encoder, position with its high byte first, and the sum of these.
+  // A reply: address of the encoder, position with its high byte first, and the sum of these bytes.
   static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
   static constexpr std::size_t expected(const Format&, const Request&, Bytes) { return longest_reply; }
   // after an error more bytes may follow, so the host waits for silence
@@ -107,6 +107,6 @@ struct Protocol {
 };
 
 extern const Unit unit;
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< The demands of the encoder's document.
 
 }  // namespace absenc::protocol_name

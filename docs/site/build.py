@@ -17,7 +17,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 AWESOME = Path("/usr/share/doxygen-awesome-css/doxygen-awesome.css")
 PAGES = ["README.md", "CONTRIBUTING.md", "docs/*.md", "absenc/protocol/*/README.md", "tests/abuse/README.md"]
-# Below the README, which is the index: caption and pages. Pages that no list names are an error of Sphinx.
+# Lists of pages below the README, which is the index, by their caption. Sphinx reports a page that no list names as an
+# error.
 CONTENTS = {
     "Use": ["docs/read", "docs/set-up", "docs/record", "docs/serve", "docs/mqtt", "docs/tap", "docs/decode", "docs/doctor",
             "docs/test-a-drive", "man/absenc.1"],

@@ -11,7 +11,7 @@ project = "absenc"
 version = release = os.environ["ABSENC_VERSION"]
 copyright = "absenc developers, Apache-2.0"  # noqa: A001: the name is Sphinx's
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
-nitpicky = False  # types of the standard library and of NumPy have no page here
+nitpicky = False  # false, because types of the standard library and of NumPy have no page here
 myst_heading_anchors = 4
 autodoc_typehints = "signature"
 autodoc_member_order = "groupwise"
@@ -33,4 +33,4 @@ pygments_dark_style = "monokai"
 
 
 def setup(app):
-    app.add_lexer("caddy", TextLexer)  # Pygments has none for it
+    app.add_lexer("caddy", TextLexer)  # Pygments has no lexer for the language caddy

@@ -10,7 +10,7 @@
 
 namespace absenc::firmware {
 
-/// Hardware provides the functions of the part:
+/// The class Hardware calls the controller of your microcontroller. It has these functions:
 ///
 ///   void transmit(const CanFrame&);      // calls `transmitted` when the frame is acknowledged
 ///   std::optional<CanFrame> take();      // returns the oldest received frame; none if the FIFO is empty

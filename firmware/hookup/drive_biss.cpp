@@ -14,12 +14,13 @@
 using namespace absenc;
 using namespace std::chrono_literals;
 
-Time now();                            // yours: time since start, from a counter that never stops
-void spi_receive(MutableBytes bytes);  // yours: clocks the bytes in by DMA, returns at once
-void set_clock(bool high);             // yours: level of the clock line while the controller rests
+Time now();  // you write this: returns the time since start, from a counter that never stops
+// you write this: starts receiving the bytes over SPI by DMA, and returns at once
+void spi_receive(MutableBytes bytes);
+void set_clock(bool high);  // you write this: sets the level of the clock line while the SPI controller rests
 
 struct Axis {
-  // 19 bits at 5 MHz. The encoder needs 1 us for a position, and its timeout adapts to the clock.
+  // The encoder has 19 bits and a clock of 5 MHz. It needs 1 us for a position; its timeout adapts to the clock.
   static constexpr biss::Format format{.ma_khz = 5000, .timeout = biss::Timeout::adaptive(), .latency = 1us};
 
   struct Read {
@@ -37,14 +38,15 @@ struct Axis {
   // The carrier calls `hold_clock`, `begin` and `result`. The clock's level in the pause is a bit for the encoder.
   void hold_clock(bool low) { set_clock(!low); }
   void begin(const ByteStep& step) {
-    if (step.kind != ByteStep::Kind::transfer) return;  // the rate of the clock stays as it is
+    // the only other step is a change of the clock rate, which is not needed here
+    if (step.kind != ByteStep::Kind::transfer) return;
     bytes = std::min((step.bits + 7) / 8, samples.size());
     spi_receive(MutableBytes(samples).first(bytes));
   }
   void result(bool) { last = cycles.cycle(); }
 } axis;
 
-// A register access that runs beside the positions: the main program makes it, and waits until it is over.
+// A register access that runs while positions are read. The main program starts it, and waits until it is over.
 struct RegisterAccess {
   alignas(std::max_align_t) std::array<std::byte, 4608> storage{};
   host::Service<std::uint8_t>* start(const Options& options, Arguments address_bank_count) {
@@ -52,14 +54,14 @@ struct RegisterAccess {
         biss::unit.host(options, *find_command(biss::unit, "memory-read"), address_bank_count, storage).bytes;
     if (read == nullptr) return nullptr;
     auto* const service = new (&service_memory) host::Service<std::uint8_t>(*read);
-    axis.cycles.add(*service);  // with the interrupts of the carrier disabled
+    axis.cycles.add(*service);  // call this while the interrupts that use the carrier are disabled
     return service;
   }
   alignas(host::Service<std::uint8_t>) std::byte service_memory[sizeof(host::Service<std::uint8_t>)];
 };
 
 void start() { axis.carrier.start(axis.cycles, now()); }
-void timer_tick() { axis.carrier.tick(now()); }  // when axis.carrier.due() is reached
+void timer_tick() { axis.carrier.tick(now()); }  // call this when the time axis.carrier.due() is reached
 void dma_complete() {
   set_clock(true);
   axis.carrier.sent(now());

@@ -12,7 +12,7 @@
 
 namespace absenc::firmware {
 
-/// Hardware provides the functions of the part:
+/// The class Hardware calls the controller of your microcontroller. It has these functions:
 ///
 ///   void clock(MutableBytes);            // receives by DMA, first bit first; calls `done` at the end
 ///   void set_rate(std::uint32_t);
@@ -46,7 +46,7 @@ class SpiDma {
   void result(bool) {}
 
  private:
-  // Shifts the frame to the first bit of the buffer.
+  // Shifts the received bits so that the frame begins with the first bit of the buffer.
   void align() {
     const std::size_t clocked = (idle_clocks_ + bits_ + 7) / 8;
     const std::size_t size = (bits_ + 7) / 8;
@@ -58,7 +58,7 @@ class SpiDma {
   }
 
   Hardware* hardware_;
-  unsigned idle_clocks_;  // number of clocks before the frame, fewer than 8
+  unsigned idle_clocks_;  // number of clocks before the first bit of the frame, fewer than 8
   host::Carrier<std::uint8_t, SpiDma> carrier_;
   std::array<std::uint8_t, 64> buffer_{};
   std::size_t bits_ = 0;

@@ -12,7 +12,7 @@
 
 namespace absenc::firmware {
 
-/// Hardware provides the functions of the part:
+/// The class Hardware calls the UART of your microcontroller. It has these functions:
 ///
 ///   void drive(bool on);                 // DE of the transceiver; also disables its receiver, to avoid echo
 ///   void transmit(Bytes);                // by DMA; ends with the UART's transmission complete, not the DMA's
@@ -24,23 +24,24 @@ namespace absenc::firmware {
 template <class Hardware>
 class UartDma {
  public:
-  /// `latency`: idle time of one character, plus the period of the tick. `hardware` must outlive this object.
+  /// Makes a hookup to `hardware`, which must outlive it. `latency`: duration of one character, after which the UART
+  /// reports an idle line, plus the period of the tick.
   UartDma(Hardware& hardware, Time latency) : hardware_(&hardware), carrier_(*this, latency) {}
 
-  /// Starts a conversation. To be called in the context of the interrupts.
+  /// Starts a conversation. Call it in the context of the interrupts.
   void start(Machine<std::uint8_t>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
   // ---- Functions that interrupts call
 
   void tick(Time now) { carrier_.tick(now); }
-  // Starts receiving before the driver releases the line: the first character may follow after 3 us.
+  // Starts receiving before the driver releases the line, because the first character may follow after 3 us.
   void transmission_complete(Time now) {
     arm(expected_);
     hardware_->drive(false);
     carrier_.sent(now);
   }
-  // More bytes may follow at once, so the other buffer is made ready first.
+  // The other buffer is made ready before the bytes are handled, because more bytes may follow at once.
   void arrived(Time now) {
     const MutableBytes buffer = buffers_[current_];
     const std::size_t count = hardware_->stop_receiving();
@@ -62,7 +63,7 @@ class UartDma {
   void result(bool) {}
 
  private:
-  // Starts receiving up to `count` bytes; 0: as many as the buffer holds.
+  // Starts receiving up to `count` bytes; 0 means as many as the buffer holds.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

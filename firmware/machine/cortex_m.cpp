@@ -28,7 +28,7 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Only the interrupts of the UART and of one timer are enabled.
+// Vectors of all device interrupts. Only those of the UART and of one timer are ever enabled.
 constexpr auto devices = [] {
   auto all = filled(std::array<void (*)(), 32>{}, uart);
   all[absenc::machine::alarm_number] = alarm;
@@ -59,7 +59,7 @@ constexpr std::uint32_t tick_is_pending = 1u << 26;
 
 std::uint32_t counts_of_period = 0;
 Time period_of_ticks{};
-Time begin_of_tick{};  // start of the current period; written by the tick's interrupt only
+Time begin_of_tick{};  // start of the present period of the tick; only the tick's interrupt writes it
 }  // namespace
 
 void start_clock(Time period) {
@@ -75,7 +75,8 @@ Time now() {
   asm volatile("mrs %0, primask\ncpsid i" : "=r"(masked) : : "memory");
   std::uint32_t left = register_at(value);
   Time begin = begin_of_tick;
-  if ((register_at(interrupts) & tick_is_pending) != 0) {  // the counter restarted, but `tick` has not run yet
+  // the counter has restarted, but the interrupt of the tick has not run yet
+  if ((register_at(interrupts) & tick_is_pending) != 0) {
     left = register_at(value);
     begin += period_of_ticks;
   }

@@ -20,12 +20,12 @@ void print(std::uint64_t number);
 /// Returns the number in the emulator's argument `index`, from 0 on; `otherwise` if there is none.
 [[nodiscard]] std::uint32_t argument(unsigned index, std::uint32_t otherwise);
 
-/// Starts the clock: `on_tick` is called every `period`, at most 0.5 s.
+/// Starts the clock. From now on `on_tick` is called once per `period`, which is at most 0.5 s.
 void start_clock(Time period);
 /// Returns the time since `start_clock`, with a resolution below one microsecond.
 [[nodiscard]] Time now();
 
-/// Sets that `on_alarm` is called once after `delay`, at most 1 s; a call before that replaces the delay.
+/// Starts a timer that calls `on_alarm` once after `delay`, at most 1 s. A second call before that replaces the delay.
 void set_alarm(Time delay);
 
 /// Starts the UART: from now on it calls `on_received` and `on_sent`.
@@ -60,10 +60,10 @@ void on_sent();
 /// Calls the emulator's semihosting service `number` and returns its result.
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
-/// Frequency of the clock that SysTick counts, in hertz and as an exact ratio.
+/// Frequency of the clock that SysTick counts: in hertz, and as an exact ratio of counts to nanoseconds.
 struct Frequency {
   std::uint32_t hertz;
-  std::uint32_t nanoseconds;  // time that `counts` counts take
+  std::uint32_t nanoseconds;  // time that the number of counts in `counts` takes, in nanoseconds
   std::uint32_t counts;
 };
 extern const Frequency frequency;

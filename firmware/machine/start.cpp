@@ -11,7 +11,7 @@ extern const Constructor constructors_begin[], constructors_end[];
 
 [[noreturn]] void start() {
 #ifdef __ARM_FP
-  absenc::machine::register_at(0xE000'ED88) = 0xF << 20;  // CPACR: enables the FPU
+  absenc::machine::register_at(0xE000'ED88) = 0xF << 20;  // the register CPACR, which enables the FPU
   asm volatile("dsb\nisb");
 #endif
   const std::uint32_t* from = &data_load;
@@ -23,13 +23,13 @@ extern const Constructor constructors_begin[], constructors_end[];
   absenc::machine::end(true);
 }
 
-// An unexpected fault ends the program; continuing would hide it.
+// An unexpected fault ends the program with a failure, because continuing would hide it.
 [[noreturn]] void fault() {
   absenc::machine::print("fault\n");
   absenc::machine::end(false);
 }
 
-// Static objects are never destroyed, because the program never exits.
+// Registers no destructors: static objects are never destroyed, because the program never exits.
 #ifdef __riscv
 int __cxa_atexit(void (*)(void*), void*, void*) { return 0; }
 #else
@@ -39,7 +39,7 @@ void* __dso_handle = nullptr;
 [[noreturn]] void __cxa_pure_virtual() { fault(); }
 }
 
-// Default functions for programs without interrupts.
+// Default handlers of interrupts, for programs that use no interrupts.
 namespace absenc::machine {
 [[gnu::weak]] void on_tick() {}
 [[gnu::weak]] void on_received(std::uint8_t) {}

@@ -3,7 +3,7 @@
 #include "firmware/machine/machine.hpp"
 
 extern "C" {
-// QEMU starts here and sets up neither a stack nor a trap vector.
+// QEMU begins execution here, and has set up neither a stack nor a trap vector.
 [[gnu::naked, gnu::used, gnu::section(".vectors")]] void reset() {
   asm(".option arch, +zicsr\n"
       "la sp, stack_top\n"
@@ -24,7 +24,7 @@ namespace absenc::machine {
   asm volatile(
       ".option push\n"
       ".option norvc\n"
-      ".balign 16\n"  // the three instructions are in one page of memory
+      ".balign 16\n"  // keeps the three instructions in one page of memory
       "slli zero, zero, 0x1f\n"
       "ebreak\n"
       "srai zero, zero, 7\n"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The base with which readers are compared: a program without a reader.
+// The base program: it has the start-up and measurement code of the readers, but reads nothing. figures.py
+// subtracts its figures from those of the readers.
 #include <cstring>
 
 #include "firmware/readers/reader.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the greatest costs of a reader's calls: gives it every reply of the vectors of the unit ABSENC_UNIT, whole and
-// damaged.
+// Finds the greatest costs of the calls of a reader. For this it gives the reader every reply in the vectors of the
+// unit ABSENC_UNIT, undamaged and damaged.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@
 
 namespace absenc::firmware {
 
-/// The items of a reply, of which all must fit.
+/// A copy of the items of a reply. The reply must fit into its buffer.
 template <class Item>
 class LineContent {
  public:
@@ -36,7 +36,7 @@ class LineContent {
   Buffer<Item, 512> items_;
 };
 
-/// Calls `visit` with each bit of `byte` inverted.
+/// Calls `visit` once for each bit of `byte`, with that bit inverted.
 template <class Visit>
 void damage(std::uint8_t& byte, const Visit& visit) {
   const std::uint8_t sound = byte;
@@ -47,7 +47,7 @@ void damage(std::uint8_t& byte, const Visit& visit) {
   byte = sound;
 }
 
-/// Calls `visit` with each bit of `frame` inverted, and with every size.
+/// Calls `visit` with a copy of `frame` for each bit, with that bit inverted, and for each other number of data bytes.
 template <class Visit>
 void damage(CanFrame& frame, const Visit& visit) {
   const CanFrame sound = frame;
@@ -67,8 +67,8 @@ void damage(CanFrame& frame, const Visit& visit) {
   frame = sound;
 }
 
-/// Calls `visit` with `reply`, with its damaged and truncated forms, with items before and behind it, and with two
-/// replies.
+/// Calls `visit` with `reply`, with damaged and truncated copies of it, with further items before and after it, and
+/// with two replies in a row.
 template <class Item, class Visit>
 void vary(std::span<const Item> reply, const Visit& visit) {
   static LineContent<Item> line;
@@ -116,7 +116,8 @@ void vary_vectors(const Visit& visit) {
   }
 }
 
-/// Counts the calls of a reader, then ends the emulator; `reply` must be read.
+/// Gives a reader `reply` and every vector, with all variations, and prints the number of conversations. Then ends the
+/// emulator, with failure if the reader did not accept `reply`.
 template <class Item, class Reader, class... Parameters>
 [[noreturn]] void find_bounds(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
   static Counted<Reader> reader;

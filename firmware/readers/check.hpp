@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Firmware that gives readings to one part of absenc/host, for measurements. A part has `feed`, which takes a reading,
-// and `next`, which returns whether there is a result.
+// Firmware that gives readings to one part of absenc/host, for measurements. A class for a part has `feed`, which takes
+// a reading, and `next`, which returns whether there is a result.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@
 
 namespace absenc::firmware {
 
-/// Returns a reading of `position`, latched within `open` before `at`. Not inlined, so that the compiler cannot compute
-/// with it.
+/// Returns a reading of `position` that was latched at most `open` before `at`. The function is not inlined, so that
+/// the compiler cannot evaluate readings in advance.
 [[gnu::noinline]] inline Reading reading_of(std::uint64_t position, unsigned bits, unsigned turns, double unit_um,
                                             Time at, Time open) {
   return {.singleturn = position & low_mask(bits),
@@ -40,8 +40,8 @@ struct Motion {
   unsigned turns;
   double unit_um;
   Time period;
-  std::uint64_t speed;  // counts in a period, times 2^16; modulo 2^64
-  Time open;            // longest uncertainty of a latch time
+  std::uint64_t speed;  // speed in counts per period, times 2^16, modulo 2^64
+  Time open;            // greatest uncertainty of a latch time
 };
 
 /// Gives readings of many motions to a part, then ends the emulator.
@@ -56,7 +56,8 @@ template <class Part>
       std::to_array<Time>({microseconds(50), milliseconds(1), milliseconds(70), seconds(9)});
   static constexpr auto speeds =
       std::to_array<std::uint64_t>({0, 99, 0x10000, 0 - std::uint64_t{0x1234'5678}, 1ull << 45});
-  static constexpr auto uncertainties = std::to_array<std::int64_t>({0, 8, 1});  // divisors of the period; 0: none
+  // the uncertainty of the latch time is the period divided by these numbers; 0: no uncertainty
+  static constexpr auto uncertainties = std::to_array<std::int64_t>({0, 8, 1});
   static Counted<Part> part;
   std::uint32_t random = 1;
   std::uint32_t results = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A reader's conversation with an encoder that answers each request, and the marks between which count.cpp counts.
+// A conversation with an encoder that answers each request, and the marks between which the plugin count.cpp counts
+// instructions.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +10,13 @@
 #include "absenc/link/can.hpp"
 #include "absenc/link/step.hpp"
 
-// The functions must not be inlined, because the plugin finds them by their addresses.
+// The functions that mark begin and end must not be inlined, because the plugin finds them by their addresses.
 #define ABSENC_MARKS(name)                                           \
   [[gnu::noinline]] inline void name##_begin() { asm volatile(""); } \
   [[gnu::noinline]] inline void name##_end() { asm volatile(""); }
 extern "C" {
-ABSENC_MARKS(count)  // each count is printed
-ABSENC_MARKS(feed)   // for `feed`, `next` and `result` the greatest counts are printed
+ABSENC_MARKS(count)  // the plugin prints each count between the marks `count`
+ABSENC_MARKS(feed)   // for the marks `feed`, `next` and `result` the plugin prints only the greatest counts
 ABSENC_MARKS(next)
 ABSENC_MARKS(result)  // from the event that ends a conversation to its result
 }

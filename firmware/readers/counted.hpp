@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An object whose calls are counted. call_graph.py finds them by their names, so they must not be inlined.
+// An object whose member calls are counted. They must not be inlined, because call_graph.py finds them by their names.
 #pragma once
 
 #include <cstddef>

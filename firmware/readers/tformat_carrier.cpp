@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads T-format like tformat.cpp, but through the carrier.
+// Reads T-format like tformat.cpp, but the class host::Carrier runs the conversation.
 #include <array>
 
 #include "absenc/host/carrier.hpp"
@@ -13,7 +13,7 @@ constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01
 
 #ifdef ABSENC_UNIT
 
-// Stores the last transfer or result.
+// The line of the carrier. It only stores which step or result the carrier gave last.
 struct Line {
   void begin(const ByteStep& step) { last = step.kind; }
   void result(bool over) { last = over ? ByteStep::Kind::done : ByteStep::Kind::emit; }
@@ -21,7 +21,8 @@ struct Line {
 };
 using Carrier = host::Carrier<std::uint8_t, Line>;
 
-// A carrier with its conversation as a reader: `feed` is an interrupt, the first `next` starts the conversation.
+// A carrier and its conversation with the interface of a reader: `feed` acts as an interrupt, and the first call of
+// `next` starts the conversation.
 class CarriedReader {
  public:
   void feed(const ByteEvent& event) {
@@ -52,7 +53,7 @@ struct Line {
 };
 using Carrier = host::Carrier<std::uint8_t, Line>;
 
-// Stands in for an interrupt handler, which gets the received character in a register.
+// Represents an interrupt handler, which gets the received character in a register.
 [[gnu::noinline]] void interrupt(Carrier& carrier, std::uint8_t character, Time now) {
   carrier.received({&character, 1}, now);
 }

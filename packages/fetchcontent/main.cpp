@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A conversation without a line: the reply of a Smart-Abs at position 74565 of 17 bits and 4660 turns is a constant.
+// Runs a conversation without a line: the reply of a Smart-Abs encoder at 74565 of 2^17 counts and 4660 turns is a
+// constant.
 #include <array>
 #include <cstdint>
 
@@ -14,7 +15,7 @@ int main() {
   for (ByteStep step = read.next(now); step.kind != ByteStep::Kind::done; step = read.next(now)) {
     now += std::chrono::microseconds(50);
     if (step.kind == ByteStep::Kind::transfer) {
-      read.feed({.kind = ByteEvent::Kind::sent, .at = now});  // step.out was sent
+      read.feed({.kind = ByteEvent::Kind::sent, .at = now});  // tells the conversation that its request was sent
     } else {
       read.feed({.kind = ByteEvent::Kind::received, .at = now, .items = reply});
     }

@@ -11,7 +11,7 @@ from .errors import UsageError
 #: Value of an option; an iterable gives the option several times.
 Value = Union[str, int, float, bool, None, Iterable[str]]
 
-#: Value of a field; flags are a tuple of names; None: not reported, or invalid.
+#: Value of a field. Flags are a tuple of names. None means that the value was not reported, or is invalid.
 Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 
@@ -26,7 +26,7 @@ def texts(options: Mapping[str, Value]) -> list[str]:
     """Converts `alarm=["a", "b"]` to "alarm=a", "alarm=b"; None is omitted."""
     settings = []
     for name, value in options.items():
-        if value is None:  # None is the default of keywords: the option is not given
+        if value is None:  # keyword arguments have the default None, which means that the option is not given
             continue
         if isinstance(value, bool):
             settings.append(f"{name}={str(value).lower()}")

@@ -93,7 +93,7 @@ def _masked(chunks: list[list[tuple[Any, npt.NDArray[np.bool_]]]], columns: list
             rows[column.name][at:end] = values
             if column.dtype != "O":
                 missing[column.name][at:end] = absent
-        chunks[i] = []  # releases the memory of the chunk, which `rows` now contains
+        chunks[i] = []  # releases the memory of the chunk, whose values are now in `rows`
         at = end
     return np.ma.MaskedArray(rows, mask=missing)  # type: ignore[no-untyped-call]
 

@@ -8,7 +8,8 @@ from typing import Optional
 class AbsencError(Exception):
     """Base class of the exceptions of this package."""
 
-    #: State of a call that changes the encoder: "not_sent", "confirmed", "refused", "unknown"; or None.
+    #: For a call that changes the encoder, the state of the change: "not_sent", "confirmed", "refused" or "unknown";
+    #: otherwise None.
     change: Optional[str] = None
 
 
@@ -147,5 +148,5 @@ class NotStill(EncoderError):
     name = "not_still"
 
 
-#: Classes of EncoderError by the name of the error.
+#: Subclasses of EncoderError, by the name of the error.
 by_name: dict[str, type[EncoderError]] = {one.name: one for one in EncoderError.__subclasses__()}

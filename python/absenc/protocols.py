@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _absenc
 from ._values import Field, Value, texts
 
-#: A frame: bytes, or text: "1A 00"; on CAN "1FF:022B", on clocked links "0001".
+#: A frame: bytes, or as text "1A 00"; on CAN "1FF:022B", on clocked links "0001".
 Frame = Union[bytes, bytearray, memoryview, str]
 
 
@@ -50,7 +50,8 @@ class Protocol:
         self.fields: list[str] = description["fields"]
         self.conditions: list[str] = description["conditions"]  #: names of the conditions of its virtual encoder
         self.flags: list[Flag] = [Flag(*flag) for flag in description["flags"]]  #: flags of all alarm and status fields
-        named = {flag.name: flag for flag in reversed(self.flags)}  # a status flag may have the name of an alarm
+        # if a status flag and an alarm have the same name, the first flag counts
+        named = {flag.name: flag for flag in reversed(self.flags)}
         self.alarms: list[Flag] = [named[name] for name in description["alarms"]]
         self.commands: dict[str, Command] = {
             one["name"]: Command(
@@ -100,7 +101,7 @@ class Protocols(Mapping[str, Protocol]):
         return len(_absenc.units())
 
 
-#: All protocols: protocol["tformat"]. An unknown name raises UsageError.
+#: All protocols by name: protocol["tformat"]. An unknown name raises UsageError.
 protocol = Protocols()
 
 

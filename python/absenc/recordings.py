@@ -18,11 +18,13 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # first words of the meaning of a column of flags
-ALL_CLEAR = "none"  # cell of a flags column in CSV: all are reported clear; an empty cell: not all are reported
-NOT_ENDED = "18446744073709551615"  # attribute `rows` in HDF5 while the recording is written
+FLAG_WORDS = "names, separated by spaces"  # a column with a meaning that begins with these words contains flags
+# content of a cell in CSV if all flags are reported clear; an empty cell means that not all are reported
+ALL_CLEAR = "none"
+# value of the attribute `rows` in an HDF5 file while the recording is still being written
+NOT_ENDED = "18446744073709551615"
 
-#: Values of one row, by column; None: missing or invalid.
+#: Values of one row, by column; None means that a value is missing or invalid.
 Cells = Mapping[str, Any]
 
 
@@ -91,7 +93,7 @@ class _Parsed(NamedTuple):
     meanings: Mapping[str, str]
     names: Sequence[str]
     rows: Sequence[Cells]
-    ends_after: Union[int, None]  # number of rows according to the last line; None without such a line
+    ends_after: Union[int, None]  # number of rows that the last line of the file states; None if there is no such line
 
 
 def _recording(parsed: _Parsed, damage: str) -> Recording:
@@ -139,7 +141,8 @@ def _parse_json_lines(lines: list[str]) -> _Parsed:
     names: list[str] = []
     for name in meanings:
         names.append(name)
-        if name in ("singleturn", "multiturn"):  # no other column has a column for its validity
+        # only these two columns have a further column that states whether their value is valid
+        if name in ("singleturn", "multiturn"):
             names.append(name + "_valid")
     for row in rows:
         for name, value in row.items():
@@ -177,7 +180,8 @@ def _load_hdf5(path: Path) -> Recording:
             raise Failure(f"{path} is HDF5, but no recording of absenc")
         names = attributes.pop("columns").split(",")
         ended = attributes.pop("rows", NOT_ENDED)
-        count = len(file["time_s"])  # `time_s` is written last: after a kill the other columns may have more rows
+        # `time_s` is written last: if the program was killed, the other columns may have more rows
+        count = len(file["time_s"])
         dtypes = {
             name: "O" if type.kind == "S" else "?" if type == np.int8 else f"{type.kind}{type.itemsize}"
             for name, type in ((name, file[name].dtype) for name in names)

@@ -18,12 +18,12 @@ namespace absenc::python {
 
 namespace py = pybind11;
 
-/// A watch for exceptions of Python signal handlers, which run in the main thread only.
+/// Watches for exceptions that handlers of signals in Python raise. Such handlers run only in the main thread.
 class SignalWatch {
  public:
-  /// Returns whether a signal handler has raised an exception. To be called without the GIL.
+  /// Returns whether a signal handler has raised an exception. Call it without holding Python's global lock (GIL).
   [[nodiscard]] bool wants_end();
-  /// Throws the exception that the signal handler raised, if any. Call it with the GIL.
+  /// Throws the exception that the signal handler has raised, if any. Call it while holding the GIL.
   void rethrow();
 
  private:
@@ -42,7 +42,7 @@ void register_exceptions();
 /// Returns the values of an answer as a dict by column name.
 [[nodiscard]] py::dict to_python(const client::Answer& answer);
 [[nodiscard]] py::dict to_python(const std::vector<client::Column>& columns, const std::vector<client::Value>& values);
-/// Returns the names of the flags that are set, of all channels.
+/// Returns the names of the flags that are set, for all channels of the encoder.
 [[nodiscard]] py::list names_of(const std::vector<client::Flags>& flags);
 
 [[nodiscard]] inline py::bytes to_bytes(Bytes bytes) {

@@ -78,7 +78,7 @@ struct Values {
     return objects();
   }
 
-  // Equal values share an object, as long as there are few different ones.
+  // Returns the texts as Python objects. Equal texts share one object as long as there are few different texts.
   [[nodiscard]] py::object objects() const {
     py::list list(ends.size());
     std::unordered_map<std::string_view, py::object> known;
@@ -140,7 +140,7 @@ class Rows {
     return list;
   }
 
-  /// Returns a tuple (values, missing) for each column; None at the end of the capture.
+  /// Returns a tuple (values, missing) for each column of the next part; None at the end of the capture.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

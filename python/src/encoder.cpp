@@ -41,7 +41,7 @@ struct Closed : client::UsageError {
 /// An encoder that any Python thread may use. Threads take turns and wait without the GIL.
 class PyEncoder {
  public:
-  /// Calls `work` without the GIL; its result must not contain Python objects.
+  /// Calls `work` without holding the GIL. The result of `work` must not contain Python objects.
   template <class Work>
   auto use(const Work& work) {
     try {
@@ -63,17 +63,17 @@ class PyEncoder {
   PyEncoder(const PyEncoder&) = delete;
   PyEncoder& operator=(const PyEncoder&) = delete;
 
-  /// Throws the exception that a Python signal handler raised during a wait, if any.
+  /// Throws the exception that a Python signal handler has raised during a wait, if any.
   void check() { watch_.rethrow(); }
 
   void close() {
-    encoder_.cancel();  // ends the waits of the encoder; allowed from any thread
+    encoder_.cancel();  // ends the encoder's waits in other threads; any thread may call it
     const py::gil_scoped_release released;
     const std::lock_guard lock(mutex_);
     if (!std::exchange(closed_, true)) encoder_.disconnect();
   }
 
-  /// Ends the waits of the encoder if `stopping`, else permits them.
+  /// Ends the waits of the encoder if `stopping` is true; otherwise permits waits again.
   void stop(bool stopping) { stopping_ = stopping; }
 
   [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }
@@ -126,7 +126,7 @@ std::int64_t whole_number(const Argument& argument, const py::handle& value) {
   }
 }
 
-/// Returns the arguments in the order of the command. Throws UsageError.
+/// Returns the arguments in the order in which the command declares them. Throws UsageError.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
   if (args.size() > command.arguments.size()) {
@@ -206,7 +206,7 @@ MemoryWords to_list(const client::MemoryImage& image) {
   return list;
 }
 
-// Words are sequences of bytes, the low byte first.
+// Returns the memory image that `bytes` describe from `address` on. Words consist of several bytes, the low byte first.
 client::MemoryImage image_of(const Unit& unit, std::uint32_t page, std::uint32_t address, std::string_view bytes) {
   client::MemoryImage image;
   const std::size_t word = client::word_bytes(unit);

@@ -138,7 +138,7 @@ std::vector<std::string> error_names() {
   return names;
 }
 
-/// Returns an array with the CRC of each row.
+/// Returns an array that contains the CRC of each row of `rows`.
 py::array_t<std::uint16_t> crc(const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>& rows,
                                unsigned width, std::uint16_t poly, std::uint16_t init, bool refin, bool refout,
                                std::uint16_t xorout) {

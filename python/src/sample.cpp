@@ -10,7 +10,7 @@ namespace absenc::python {
 
 namespace {
 
-// Calls `act` for each member of a reading except its two times, which have another type.
+// Calls `act` for each member of a reading except the two times, whose type is different.
 template <class Act>
 void each_member(Reading& reading, const Act& act) {
   act(reading.singleturn);
@@ -30,7 +30,7 @@ void each_member(Reading& reading, const Act& act) {
   act(reading.alarms_reported);
 }
 
-// Returns the state of a reading for `pickle`: id of the unit, members, times.
+// Returns the state of a reading for `pickle`: id of the unit, the members, and the two times.
 py::tuple state_of(const PyReading& one) {
   py::list state;
   state.append(std::string(one.unit->id));

@@ -40,7 +40,7 @@ struct PyReading {
   }
   [[nodiscard]] py::object alarms() const { return names_or_none(client::alarms_of(*unit, reading)); }
   [[nodiscard]] py::object status() const { return names_or_none(client::status_of(*unit, reading)); }
-  // Returns the names of the raised flags; None if none is raised and not all are reported.
+  // Returns the names of the raised flags. Returns None if no flag is raised and not all flags are reported.
   [[nodiscard]] static py::object names_or_none(const std::vector<client::Flags>& channels) {
     const py::list names = names_of(channels);
     const bool is_complete = !channels.empty() && std::all_of(channels.begin(), channels.end(),

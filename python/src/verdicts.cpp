@@ -16,7 +16,8 @@ using SettingTexts = std::vector<std::string>;
 
 Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
-/// Runs `work` without the GIL. Its argument returns whether a signal handler raised an exception.
+/// Runs `work` without holding the GIL. `work` gets a function that returns whether a Python signal handler has raised
+/// an exception.
 template <class Work>
 std::string watched(const Work& work) {
   SignalWatch watch;

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import os
 
-os.environ.setdefault("ABSENC_CHANGES", "none")  # tests write nothing to the user's journal of changes
+os.environ.setdefault("ABSENC_CHANGES", "none")  # keeps the tests from writing to the user's journal of changes
 
 pytest_plugins = ["absenc.pytest_plugin"]

@@ -81,7 +81,7 @@ def test_refuses_missing_files_and_unknown_columns(tmp_path):
     with pytest.raises(absenc.AbsencError):
         absenc.decode(tmp_path / "none.sr", "tformat")
     with pytest.raises(absenc.AbsencError):
-        # The exception is raised before the first batch is requested.
+        # The exception is raised although no batch has been requested yet.
         absenc.decode_batches(tmp_path / "none.sr", "tformat")
     with pytest.raises(KeyError, match="angle_deg"):
         absenc.decode(TEXT, "tformat")["angel"]

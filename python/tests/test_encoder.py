@@ -13,7 +13,7 @@ import tty
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # latency, long because a busy machine may delay replies
+PATIENCE_MS = 500  # setting `latency` in milliseconds; it is long because a busy machine may delay replies
 
 
 def test_error_has_sent_and_received_bytes_and_advice(absenc_emulate):
@@ -73,7 +73,7 @@ def test_refuses_invalid_numbers_and_options():
     with absenc.open("sim:tformat", model=None) as encoder:
         for numbers in [(0, 10**9), (0, 2**31), (10**6, 1)]:
             with pytest.raises(absenc.UsageError):
-                encoder.memory.read(*numbers)  # a read of too many bytes is refused before memory is allocated
+                encoder.memory.read(*numbers)  # a request to read too many bytes is refused before memory is allocated
         for argument in (2**80, -(2**80), "five", None, 1.5):
             with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
                 encoder.run("memory-read", argument)

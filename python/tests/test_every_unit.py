@@ -8,7 +8,8 @@ import subprocess
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # a busy machine may delay replies; a test that waits for silence takes this long
+# milliseconds to wait for a reply, because a busy machine may delay it; a test that waits for silence takes this long
+PATIENCE_MS = 500
 UNITS = sorted(absenc.protocol)
 
 
@@ -59,15 +60,16 @@ def test_encodes_and_decodes_requests(unit):
         try:
             request = unit.encode(command.name)
         except absenc.UsageError:
-            continue  # the command cannot be encoded with the options of the first model
+            continue  # with the options of the first model the command cannot be encoded
         if request:
             requests.append(request)
-    assert requests or unit.link == "clocked"  # on clocked links the clock itself requests a position
+    # clocked links have no request, because the clock itself requests a position
+    assert requests or unit.link == "clocked"
     for request in requests:
         assert isinstance(request, str if unit.link in ("can", "clocked") else bytes)
         unit.decode("", request=request)
         if unit.link == "clocked":
-            continue  # a clocked request has only bits, so no invalid one exists
+            continue  # the request of a clocked link is only a sequence of bits, so none is invalid
         other = "7" + request[1:] if unit.link == "can" else b"\xff" + request[1:] + b"\xff"
         with pytest.raises(absenc.EncoderError):
             unit.decode("", request=other)

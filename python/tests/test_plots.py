@@ -47,7 +47,7 @@ def test_plots_deviation_from_constant_speed(turning):
     bump = turning["position"][good].data - before
     time = turning["time_s"][good].data
     deviation = plots.eccentricity(turning).axes[0].lines[0].get_ydata()
-    # The expected curve comes from the readings, because on a busy machine their times vary.
+    # The expected curve is made from the readings themselves, because on a busy machine their times vary.
     expected = bump - np.polyval(np.polyfit(time, bump, 1), time)
     assert np.abs(deviation - expected).max() < 3
     assert np.ptp(deviation) > 600

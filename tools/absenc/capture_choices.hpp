@@ -10,7 +10,7 @@
 
 namespace absenc::tool {
 
-/// Returns `path` and the values of the options of captures. Throws UsageError.
+/// Returns the path of a capture with the command-line options that describe it. Throws UsageError.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 }  // namespace absenc::tool

@@ -114,7 +114,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  // An alarm that has no flag with the encoder's options can be lowered, but not raised.
+  // If the encoder's options leave out the flag of an alarm, this alarm can be lowered, but not raised.
   const std::uint32_t bits = raise ? require_alarms(unit_, device.options(), all) : require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));
@@ -123,7 +123,7 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
-// Sets the rates of named faults, such as "drop=0.1". Returns all faults with a rate above 0.
+// Sets the rates of the faults that `wanted` names, such as "drop=0.1". Returns all faults with a rate above 0 as text.
 std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
   sim::FaultRates rates = device.fault_rates();
   for (std::string_view rest = wanted; !is_blank(rest);) {

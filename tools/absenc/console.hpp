@@ -16,7 +16,7 @@ using namespace client;
 
 class Console {
  public:
-  /// `unit` and the encoders must outlive the console; all encoders belong to `unit`.
+  /// Makes a console for virtual encoders of the protocol `unit`. The unit and the encoders must outlive it.
   Console(const Unit& unit, std::vector<VirtualDevice*> devices) : unit_(unit), devices_(std::move(devices)) {}
 
   /// Executes the lines that wait on standard input, and prints the answers.
@@ -24,7 +24,8 @@ class Console {
   /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// Executes `line` for all encoders, or for one as in "2:". Returns the answer. Throws UsageError.
+  /// Executes `line` for all encoders, or for one encoder if the line begins with its number, as in "2:". Returns the
+  /// answer. Throws UsageError.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:
@@ -37,7 +38,7 @@ class Console {
   const Unit& unit_;
   std::vector<VirtualDevice*> devices_;
   os::InputLines lines_;
-  bool unheard_ = false;  // whether standard output was found closed, so that nobody reads the answers
+  bool unheard_ = false;  // standard output was found closed, so nobody reads the answers
 };
 
 }  // namespace absenc::tool

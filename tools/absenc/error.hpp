@@ -6,12 +6,13 @@
 
 namespace absenc::tool {
 
-using namespace client;  // the command uses the library's names without a prefix
+using namespace client;  // the command uses the names of namespace client without a prefix
 
 inline constexpr int exit_good = 0;
-inline constexpr int exit_failed = 1;  // exit status, for example if the encoder, the line or the system failed
+inline constexpr int exit_failed = 1;  // exit status of a failure, for example of the encoder, the line or the system
 inline constexpr int exit_usage = 2;
-inline constexpr int exit_nothing_judged = 3;  // exit status: nothing was observed that a verdict could be based on
+// exit status of a test without a verdict, because too little was observed
+inline constexpr int exit_nothing_judged = 3;
 
 /// Exception thrown when standard output is closed, as after `| head`.
 struct OutputClosed {};

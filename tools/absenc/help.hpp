@@ -51,7 +51,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 /// Returns the help text of the whole command, or of a verb.
 [[nodiscard]] std::string help();
 [[nodiscard]] std::string help(const Subcommand& subcommand);
-/// Returns the help text of the verbs whose first word is `first_word_of_two`.
+/// Returns the help text of all verbs of two words that begin with `first_word_of_two`, such as "memory".
 [[nodiscard]] std::string help(std::string_view first_word_of_two);
 
 /// Returns the usage line of a verb: "absenc read <encoder> [options]".

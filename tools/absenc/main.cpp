@@ -59,7 +59,7 @@ class ArgumentParser {
   }
 
  private:
-  // "-5" is a negative number, not an option.
+  // A word like "-5" is a negative number, not an option.
   static bool is_name(std::string_view word) {
     return word.size() > 1 && word[0] == '-' && word[1] != '.' && (word[1] < '0' || word[1] > '9');
   }
@@ -94,7 +94,7 @@ class ArgumentParser {
     if (!parameter.repeatable) ++taken_;
   }
 
-  // Splits "tformat?model=23-bit&motion=rpm=60", as in sim: addresses, into protocol and settings.
+  // Splits a word like "tformat?model=23-bit&motion=rpm=60", which may begin with "sim:", into protocol and settings.
   void take_protocol(std::string_view word) {
     constexpr std::string_view sim = "sim:";
     if (word.starts_with(sim)) word.remove_prefix(sim.size());
@@ -139,7 +139,7 @@ class ArgumentParser {
     throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
   }
 
-  // Throws UsageError for a wrong number of parameters or values.
+  // Throws UsageError if there are too few or too many parameters or values.
   void refuse_numbers() const {
     if (extra_) {
       throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
@@ -166,7 +166,7 @@ class ArgumentParser {
   Invocation invocation_;
 };
 
-// Throws UsageError: after `group`, which may be "", no verb continues with `words`.
+// Throws UsageError, because no verb begins with `group` (which may be "") and continues with `words`.
 [[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
   const std::vector<std::string_view> verbs = words_after(group);
   if (words.empty()) {
@@ -198,7 +198,7 @@ void require_last(std::span<char*> words) {
   throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
 }
 
-/// Returns the verb, or null if none is to be run. An unknown word is never skipped.
+/// Returns the verb that `words` begin with, or null if no verb is to be run. An unknown word is never skipped.
 const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
   for (;;) {
     if (words.empty()) refuse_verb(understood, words);
@@ -258,14 +258,15 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
-// Without any word, the user has probably just connected an adapter.
+// Called if absenc is run without any word: the user has probably just connected an adapter, so the ports are listed.
 int welcome() {
   const int status = ports_subcommand.run({});
   print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");
   return status;
 }
 
-/// Returns the exit status. `understood` receives the recognised part of the verb.
+/// Runs the command line `words` and returns the exit status. `understood` receives the part of the verb that was
+/// recognised.
 int run_command_line(std::span<char*> words, std::string& understood) {
   if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);
@@ -284,7 +285,7 @@ int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
   std::string understood;
   std::vector<char*> words(arguments, arguments + argument_count);
-  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows argc to be 0
+  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows that argc is 0
   if (words.size() == 1 && words.front() == absenc::serve::mqtt_process_verb) return absenc::serve::run_mqtt_process();
   std::string help_option = "--help", version_option = "--version";
   // `absenc help read` prints the same as `absenc read --help`.

@@ -9,10 +9,12 @@
 
 namespace absenc::tool {
 
-/// Returns --rate in readings per second (0: as fast as possible), or `fallback`. Throws UsageError.
+/// Returns the value of --rate in readings per second (0: as fast as possible), or `fallback` without this option.
+/// Throws UsageError.
 [[nodiscard]] double readings_a_second(const Invocation& invocation, double fallback);
 
-/// Returns the settings of --option, "command=NAME" of --command and "realtime=PRIORITY" of --realtime.
+/// Returns settings for the encoder's address: those of --option, "command=NAME" for --command, "realtime=PRIORITY" for
+/// --realtime.
 [[nodiscard]] std::vector<std::string> reading_settings(const Invocation& invocation);
 
 }  // namespace absenc::tool

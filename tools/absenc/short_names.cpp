@@ -28,7 +28,7 @@ std::size_t count_different(std::span<const std::string> names) {
   return std::set<std::string_view>(names.begin(), names.end()).size();
 }
 
-// Returns the names cut to `width` bytes at one place that keeps them different, or nothing.
+// Cuts the names at one common place to `width` bytes. Returns nothing if no such place keeps them different.
 Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   const std::size_t different = count_different(names);
   const std::size_t most = width - gap.size();
@@ -40,7 +40,7 @@ Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   return {};
 }
 
-// Lengths of the common beginning of all names and of their common end.
+// Lengths of the beginning and of the end that all names have in common.
 struct Common {
   std::size_t front;
   std::size_t back;
@@ -61,7 +61,7 @@ Common common_parts(std::span<const std::string> names) {
   return common;
 }
 
-// Returns the names with ".." in place of their common beginning and common end, if they have any.
+// Returns the names with ".." in place of the beginning and the end that all of them have in common, if there are any.
 Names middles(std::span<const std::string> names) {
   const auto [front, back] = common_parts(names);
   Names cuts;
@@ -72,7 +72,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns each name after its number, both cut to `width` bytes: "3 tfo..=7". Equal names have one number.
+// Returns each name after its number, cut to `width` bytes together: "3 tfo..=7". Equal names have the same number.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

@@ -60,7 +60,7 @@ std::string_view first_word(const Subcommand& subcommand) {
 }
 
 std::string_view last_word(const Subcommand& subcommand) {
-  // Without a blank, `find` returns npos, and npos + 1 is 0: the whole name.
+  // In a name without a blank `find` returns npos, and npos + 1 is 0, so the whole name is returned.
   return subcommand.name.substr(subcommand.name.find(' ') + 1);
 }
 

@@ -17,7 +17,8 @@ struct Parameter {
   std::string_view meaning;
   std::string_view fallback{};  // the default in words, for help; "": none
   bool required = false;
-  bool repeatable = false;  // an argument that takes all words to the end, or an option that may be given several times
+  // true for an argument that takes all words to the end, and for an option that may be given several times
+  bool repeatable = false;
 
   [[nodiscard]] constexpr bool is_option() const { return name.starts_with("--"); }
 };
@@ -33,10 +34,10 @@ class Invocation {
   void add(std::string_view name, std::string value) { values_[name].push_back(std::move(value)); }
 
   [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
-  /// Returns the last value that the user gave for a parameter, or `fallback` without a value.
+  /// Returns the last value that the user gave for the parameter `name`, or `fallback` if there is none.
   [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
   [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
-  /// Returns the last value as a number, decimal or with 0x, or `fallback`. Throws UsageError.
+  /// Returns the last value of the parameter `name` as a number, decimal or with 0x, or `fallback`. Throws UsageError.
   [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
                                     std::int64_t maximum) const;
   [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;

@@ -15,12 +15,13 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns the settings of virtual encoders in the verb's options. Throws UsageError.
+/// Returns the settings of virtual encoders that the options of the verb state. Throws UsageError.
 [[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
-/// Returns the sim: address of one more encoder, from a value of --also. Throws UsageError.
+/// Returns the sim: address of a further encoder, from a value of the option --also. Throws UsageError.
 [[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                              const DeviceSettings& settings);
-/// Prints a device's answers, time since `start`, faults, and the rules that its host broke.
+/// Prints about a virtual encoder: number of answers, time since `start`, injected faults, and rules that its host
+/// broke.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
 template <class Item>
@@ -47,7 +48,7 @@ class VirtualLine {
     }
   }
 
-  /// Returns the first encoder, whose memory the option --memory stores in a file.
+  /// Returns the first encoder. The option --memory stores its memory in a file.
   [[nodiscard]] Device<Item>& first() {
     if constexpr (is_can) {
       return *devices_.front()->device().frames;

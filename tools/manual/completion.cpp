@@ -12,7 +12,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Bash also splits words at : and =, except inside quotes, and replaces only the last part.
+// Bash also splits words at : and = unless they are in quotes, and a completion replaces only the last part of a word.
 constexpr std::string_view functions = R"bash(
 _absenc_file() {
   compopt -o filenames
@@ -199,7 +199,7 @@ std::string_view second_word(std::string_view name) {
   return name.substr(std::min(first_word(name).size() + 1, name.size()));
 }
 
-// Returns the kind of value to complete, such as "model" or "setting".
+// Returns the kind of value that is completed for a parameter, such as "model" or "setting".
 std::string_view kind_of(const Subcommand& subcommand, const Parameter& parameter) {
   if (parameter.name == "--model") return "model";
   if (parameter.name == "name" && first_word(subcommand.name) == "config") return "setting";
@@ -222,7 +222,8 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// The arrays are declared with -g, because a function may source the script.
+// Returns the declaration of a bash array with an entry for each protocol. It uses -g, because a function may source
+// the script.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {
   std::string text = fmt::format("declare -gA _absenc_{}=(\n", name);
@@ -242,7 +243,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Leaves out names of several words, which bash would split.
+// Names of several words are left out, because bash would split them.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {

@@ -73,8 +73,9 @@ std::string to_roff(std::string_view text) {
   bool line_begins = true;
   for (const char c : text) {
     if (line_begins && (c == '.' || c == '\''))
-      roff += "\\&";  // otherwise roff takes . or ' at the beginning of a line for a request
-    if (line_begins && c == '\n') roff += ".PP";  // roff would print an empty line with more space than a paragraph has
+      roff += "\\&";  // escapes . and ' at the beginning of a line, where roff takes them for a request
+    // an empty line becomes a paragraph, because roff would print it with more space
+    if (line_begins && c == '\n') roff += ".PP";
     line_begins = c == '\n';
     switch (c) {
       case '\\':

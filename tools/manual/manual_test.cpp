@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the man page and the bash completion with a command of its own.
+// Tests the man page and the bash completion of a command that this test defines.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -61,7 +61,7 @@ constexpr std::array<const Subcommand*, 8> subcommands{&read, &memory,  &memory_
 
 std::string page() { return man_page("1.2-3", subcommands, all_units()); }
 
-// Returns bash's completions of the last of `words`; ':' and '=' are words of their own.
+// Returns the completions that bash offers for the last of `words`; ':' and '=' are words of their own.
 std::vector<std::string> complete(const std::string& words) {
   std::string folder = std::filesystem::temp_directory_path() / "absenc-manual-XXXXXX";
   if (::mkdtemp(folder.data()) == nullptr) return {"no folder"};

@@ -9,7 +9,7 @@ namespace absenc::capture {
 
 namespace {
 
-// most characters that are stored before the channel of the requests is decided
+// greatest number of characters that are stored while it is not known which channel carries the requests
 constexpr std::size_t enough_characters = 2000;
 
 struct Score final : AnnotationSink {
@@ -105,7 +105,7 @@ bool Annotator::ends_with_request(const Channel& channel) {
   return false;
 }
 
-// Returns whether a silence until `begin` ends the run.
+// Returns whether the silence between the last character of a run and a character at `begin` ends the run.
 bool Annotator::is_over(const Channel& channel, Tick begin) {
   if (channel.run.empty()) return false;
   const Tick end = channel.run.end();
@@ -149,7 +149,7 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // No pause was seen before this run, so the boundaries of its frames are unknown.
+  // Without a pause before this run, the borders of its frames are unknown: all of it is reported as noise.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};

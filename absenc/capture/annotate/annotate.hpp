@@ -20,10 +20,10 @@ enum class Carries : std::uint8_t {
   both,
   requests,
   replies,
-  detect,  // unknown; detected from the characters of both channels
+  detect,  // not known yet: to be detected from the characters of both channels
 };
 
-/// Returns the times of the unit's line in ticks of a capture. An argument of 0 means not known.
+/// Returns the times of the unit's line in ticks of a capture. An argument of 0 means that this number is not known.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
 /// Converts characters to annotated exchanges. Memory does not grow with the length of the capture. Some replies equal
@@ -35,14 +35,14 @@ class Annotator {
     std::size_t channel_count = 1;
     LineTicks ticks{};
     Tick begin = 0;              // first tick of the capture
-    bool begins_silent = false;  // the line was silent before the capture
-    // characters have times of arrival at a program, not those on the line; only for one channel
+    bool begins_silent = false;  // true: the line was silent before the capture began
+    // true: characters have the times of their arrival at a program, not those on the line; only for one channel
     bool by_arrival = false;
-    // by_arrival: shortest pause that the transport to the program does not cause
+    // with `by_arrival`: shortest pause between characters that cannot come from the transport to the program
     Tick gap = 1;
   };
 
-  /// `unit` and `sink` must outlive the annotator.
+  /// Makes an annotator for `unit`, which must outlive it like `sink`.
   Annotator(const Unit& unit, const Options& options, const Settings& settings, AnnotationSink& sink);
   Annotator(const Annotator&) = delete;
   Annotator& operator=(const Annotator&) = delete;
@@ -51,20 +51,23 @@ class Annotator {
   void put(const Character& character);
   /// Ends the capture at `end`.
   void finish(Tick end);
-  /// by_arrival: reports complete frames; some only after further characters.
+  /// With `by_arrival`: reports the frames that are complete. Some can be recognised only after further characters.
   void report_complete();
-  /// by_arrival: reports everything received so far. Call it when no frame or reply can continue.
+  /// With `by_arrival`: reports everything received so far. Call it when the line was silent so long that no frame or
+  /// reply can continue.
   void report_after_silence();
-  /// Returns which frames `channel` carries; `detect` while they are not known.
+  /// Returns which kind of frames `channel` carries; `detect` while this is not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
 
  private:
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;    // false: a run that ends is reported as cut (not with arrival times)
-    bool at_frame_start = false;  // a frame is taken to begin at the next character to parse
-    std::size_t last_size = 0;    // like `stream_size`, but of this run; with arrival times a reply clears it
+    // false: no pause was seen yet, so a run that ends is reported as cut (unused with arrival times)
+    bool synchronised = false;
+    bool at_frame_start = false;  // the next character to parse is taken as the begin of a frame
+    // size of the last good unsolicited frame of this run; with arrival times a reply sets it to 0
+    std::size_t last_size = 0;
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none
   };
 
@@ -80,7 +83,7 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // Parsing of the run from index `at_` on. A returned size is 0 if nothing matches.
+  // These functions parse the run from index `at_` on. They return the size of what they found, 0 if nothing matches.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -118,15 +121,15 @@ class Annotator {
   std::array<std::size_t, 256> reply_sizes_{};  // usual size of a reply, by the index of its request; 0: not known
   std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // no frame was parsed yet, and the capture may begin within a frame or exchange
+  bool is_first_ = true;  // no frame was parsed yet: the capture may have begun within a frame or exchange
 
-  // State while a run is parsed.
+  // The following members are the state while a run is parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
-  bool whole_ = true;  // no characters will be added to the run
-  bool cut_ = false;   // the capture ends before a pause behind this run, so perhaps within a frame
+  bool whole_ = true;  // true: no further characters will be added to the run
+  bool cut_ = false;   // true: the capture ends without a pause behind this run, so perhaps within a frame
   std::size_t last_reply_at_ = 0;
-  std::size_t last_reply_size_ = 0;  // size of the reply that begins at `last_reply_at_`; 0: none
+  std::size_t last_reply_size_ = 0;  // size of the last reply of this run; 0: there is none
 };
 
 }  // namespace absenc::capture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses characters with arrival times at a program: the way there may join and split frames.
+// Parses characters that have arrival times at a program: the transport to the program may join and split frames.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -29,7 +29,7 @@ bool Annotator::stands_alone(std::size_t size) const {
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Takes the good frame at `at_` and returns its size; returns 0 if it takes none.
+// If the characters at `at_` are a good frame, reports it and returns its size; otherwise returns 0.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
@@ -37,7 +37,7 @@ std::size_t Annotator::whole_frame() {
     return reply_at(request, at_ + size, reply_sizes_[size_index(request)]) != 0;
   };
   const std::size_t size = request_at(at_);
-  // A request that comes again shows that its host had a timeout.
+  // A host that sends the same request again had a timeout, so the first request had no reply.
   const auto repeats = [&] {
     if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
     const Bytes behind = rest(at_ + size);

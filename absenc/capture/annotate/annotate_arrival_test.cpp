@@ -23,7 +23,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr Tick gap = 20;
 
-/// A request with its reply; `reply` is empty if the encoder sent none.
+/// A request with its reply; `reply` is empty if the encoder sent no reply.
 struct Exchange {
   Wire request;
   Wire reply;
@@ -129,7 +129,7 @@ TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
     const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
     receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
     at += size;
-    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses of 5 * gap, many of them within frames
+    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses of 5 * gap, many of them within a frame
   }
   annotator->report_after_silence();
   EXPECT_EQ(difference(good(), exchanges), "");
@@ -149,7 +149,8 @@ TEST_P(Arrival, ReportsExchangeWhenComplete) {
     late += good().size() <= i ? 1u : 0u;
   }
   EXPECT_EQ(difference(good(), exchanges), "");
-  EXPECT_LE(late, exchanges.size() / 20);  // a reply shorter than the last one to its command may be reported late
+  // a reply shorter than the previous reply to the same command may be reported late
+  EXPECT_LE(late, exchanges.size() / 20);
 }
 
 TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
@@ -165,7 +166,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
     annotator->report_after_silence();
     const std::vector<Exchange> found = good();
     ASSERT_GE(found.size() + 3, exchanges.size()) << from << " " << hex(collector.found[0].reply) << " " << hex(all);
-    // The found exchanges are the last ones that were sent, in the order in which they were sent.
+    // The exchanges found must be the last ones that were sent, in the same order.
     for (std::size_t i = 1; i <= found.size(); ++i) {
       ASSERT_EQ(found[found.size() - i], exchanges[exchanges.size() - i]) << from;
     }
@@ -260,7 +261,7 @@ TEST_P(Arrival, ReportsUnsolicitedFrames) {
   }
 }
 
-// Checks that replies of two lengths, each to its own command, are reported when complete.
+// Checks that replies to two commands, with different lengths, are reported as soon as they are complete.
 TEST(ArrivalOfCommands, ReplyHasUsualLengthOfItsCommand) {
   const Unit& unit = *find_unit("raa38-modbus");
   const std::vector<Exchange> exchanges{

@@ -8,7 +8,8 @@ namespace absenc::capture {
 
 // ---- Bursts
 
-// Returns the word in a burst; `with_last` appends the level of the data line behind the last clock.
+// Returns the encoder's word in a burst; `with_last` appends the level of the data line after the last clock as one
+// more bit.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -41,7 +42,7 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// Decodes a burst as a word; `answered` receives whether the encoder's control bit was sampled as 1.
+// Decodes a burst as a word; sets `answered` to whether the encoder's control bit was sampled as 1.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);
@@ -109,7 +110,7 @@ bool ControlFrames::settle(bool fell) {
   return !open_;
 }
 
-// A control frame with bad words has the error of the first one.
+// Returns the annotation of a control frame. If words of the frame are bad, it has the error of the first of them.
 Annotation ControlFrames::annotation(Judge& judge) const {
   Annotation annotation{.kind = Annotation::Kind::exchange,
                         .error = error_,
@@ -165,7 +166,7 @@ void CanAnnotator::finish(Tick end) {
     report_unanswered(0, end > requests_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
 }
 
-// Pairs the frame with the oldest request that it answers; returns false if there is none.
+// Pairs a reply with the oldest outstanding request that it answers; returns false if there is none.
 bool CanAnnotator::pair_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = 0; i < request_count_; ++i) {
@@ -177,7 +178,7 @@ bool CanAnnotator::pair_reply(const CanRecord& record) {
   return false;
 }
 
-// Pairs a bad frame with the newest request that it may answer; returns false if there is none.
+// Pairs a bad reply with the newest outstanding request that it may answer; returns false if there is none.
 bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = request_count_; i-- > 0;) {

@@ -15,18 +15,18 @@
 
 namespace absenc::capture {
 
-/// Collects control frames of clocked links: one bit of the host in each pause, one bit of the encoder in each word. A
-/// frame begins with a 1 of the host behind `zeros` zeros, and ends with `zeros` zeros.
+/// Collects control frames of clocked links (BiSS), which carry one bit of the host in each pause, one bit of the
+/// encoder in each word. A frame begins with a 1 of the host behind `zeros` zeros, and ends with `zeros` zeros.
 class ControlFrames {
  public:
   static constexpr unsigned zeros = 14;
 
   /// Returns whether a control frame is in progress, so that the encoder's control bit may be 1.
   [[nodiscard]] bool may_answer() const { return open_; }
-  /// Adds a word with the encoder's control bit and its error. Call `settle` before the next word.
+  /// Adds a word with the encoder's control bit `answered` and the word's error. Call `settle` before the next word.
   void put(const Burst& burst, bool answered, Error error);
-  /// Completes the added word; `fell`: the clock fell in the pause behind it. Returns whether a control frame ends with
-  /// it.
+  /// Completes the added word. `fell`: the clock fell in the pause after it, which is the host's bit. Returns whether a
+  /// control frame ends with this word.
   bool settle(bool fell);
   /// Ends the capture. Returns true if a control frame was in progress, which stays incomplete.
   bool finish() { return std::exchange(open_, false); }
@@ -41,7 +41,7 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
-  // An added word that `settle` has not completed.
+  // A word that was added, but not yet completed by `settle`.
   struct Pending {
     Tick begin;
     Tick end;
@@ -63,11 +63,11 @@ class ControlFrames {
 /// Annotates SPI exchanges and clocked words, and the control frames that clocked words carry.
 class BurstAnnotator {
  public:
-  /// `unit` and `sink` must outlive the annotator.
+  /// Makes an annotator for `unit`, which must outlive it like `sink`.
   BurstAnnotator(const Unit& unit, const Options& options, AnnotationSink& sink) : judge_(unit, options), sink_(sink) {}
 
   void put(const Burst& burst);
-  /// Ends the capture, and with it an incomplete control frame.
+  /// Ends the capture; a control frame that is in progress is reported as incomplete.
   void finish();
 
  private:
@@ -78,8 +78,9 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;   // storage of a word that differs from its burst
-  std::vector<std::uint8_t> silenced_;  // last word with the encoder's control communication bit cleared
+  std::vector<std::uint8_t> shifted_;  // storage of a word whose bits are shifted against those of its burst
+  // storage of the last word, with the encoder's control communication bit set to 0
+  std::vector<std::uint8_t> silenced_;
   ControlFrames control_;
 };
 

@@ -28,7 +28,8 @@ struct Check final : AnnotationSink {
     require(annotation.contents.reading == nullptr || annotation.error == Error::none);
     const bool is_echo = annotation.remark == Remark::echo;
     bytes += annotation.request.bytes.size() * (is_echo ? 2 : 1) + annotation.reply.bytes.size();
-    // A late reply may have an echo before it, but an annotation has only one remark.
+    // A late reply may follow an echo of its request, but an annotation has only one remark, so the echo is not
+    // counted.
     if (annotation.remark == Remark::late) hidden += annotation.request.bytes.size();
     if (annotation.error != Error::none || annotation.remark == Remark::cut) return;
     if (annotation.remark == Remark::undocumented) return;
@@ -38,7 +39,7 @@ struct Check final : AnnotationSink {
   const Unit& unit;
   const Options& options;
   std::size_t bytes = 0;
-  std::size_t hidden = 0;  // upper limit of the number of bytes that no annotation contains
+  std::size_t hidden = 0;  // upper limit of the number of input bytes that no annotation contains
 };
 
 void annotate(const Unit& unit, const Options& options, Annotator::Settings settings, Bytes data, bool pauses,
@@ -63,7 +64,8 @@ void annotate(const Unit& unit, const Options& options, Annotator::Settings sett
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Bytes bytes(data, size);
-  std::size_t turn = size + data[0];  // varies the kind of line with the input and the unit
+  // selects the kind of line by the size and first byte of the input, and anew for each unit
+  std::size_t turn = size + data[0];
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
     Options options;
@@ -79,7 +81,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       settings.channel_count = 2;
     }
     annotate(*unit, options, settings, bytes, true, 1);
-    // A line that never pauses takes long, so only one size in sixteen is tested.
+    // Input without pauses takes long, so only one input size in sixteen is tested.
     if (carries == Carries::both && size % 16 == 5) {
       annotate(*unit, options, settings, bytes, false, 1 + 2 * Run::capacity / size);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares annotations of random exchanges with those expected; units that use CAN are absent.
+// Compares the annotations of random exchanges with those expected, for all units that do not use CAN.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ using testing::Transmission;
 using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
-/// An annotation that owns its data.
+/// A copy of an annotation that owns its bytes and fields.
 struct OwnedAnnotation {
   Kind kind;
   Remark remark;
@@ -101,7 +101,7 @@ class Truth {
     const bool bit_is_one = place && (bits[*place / 8] >> (7 - *place % 8) & 1) != 0;
     if (bit_is_one && control_.may_answer()) bits[*place / 8] &= static_cast<std::uint8_t>(~(0x80u >> *place % 8));
     Error error = judge_.decode(request, {.bytes = bits, .bits = clocked ? burst.bits - idle : 0});
-    // A host may send more clocks than the frame needs.
+    // A host may send more clocks than the reply needs, so the reply may be shorter than the burst.
     const std::size_t size = clocked ? 0 : judge_.frame_size(Direction::reply, bits);
     if (error != Error::none && size != 0 &&
         judge_.decode(request, {.bytes = Bytes(bits).first(size)}) == Error::none) {
@@ -199,7 +199,7 @@ class Truth {
       one.remark = Remark::undocumented;
     }
     one.reading = reading(one.error);
-    // A late reply that equals its request looks like the request again.
+    // A late reply that equals its request is annotated as a repeated request.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
       add(Kind::request, Remark::unanswered, Error::timeout, request_sent, {});
       return add(Kind::request, Remark::unanswered, Error::timeout, sent, {});
@@ -222,7 +222,7 @@ class Truth {
 
 // ---- Comparison of found and expected annotations
 
-// Only a `share` of bad exchanges must match exactly: several faults may look like another one.
+// Of the bad exchanges only a `share` must match exactly, because several faults together may look like another fault.
 void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
                  double share = 1) {
   std::size_t next = 0;
@@ -246,7 +246,7 @@ void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<Ow
     if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
     const std::size_t first = next;
     bool has_error = false;
-    // A host may repeat its request during a doubled reply.
+    // A host may send its next request while an encoder still sends a doubled reply.
     const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
     for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
       if (to_text(found[next]) == following) break;
@@ -271,7 +271,8 @@ sim::FaultRates faults_of(const Unit& unit, const Options& options) {
   sim::FaultRates rates = sim::testing::damaged_replies(0.05);
   rates[sim::FaultKind::request_corrupt] = 0.005;
   rates.delay = unit.timing.turnaround_limit * 3 / 2;
-  // In a stream, a frame sent twice looks like two frames, and a late frame like one in time.
+  // In a stream these faults cannot be detected: a frame sent twice looks like two frames, a late frame like one in
+  // time.
   if (unit.streams != nullptr && unit.streams(options)) {
     rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
   }
@@ -332,7 +333,7 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Returns whether many random replies pass the check: damaged replies would look good too.
+// Returns whether the unit accepts many random replies as good, so that it would also accept damaged replies.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);
@@ -373,7 +374,7 @@ TEST_P(Characters, FindsRepliesWithoutRequests) {
   EXPECT_GE(positions, expected);
 }
 
-// Checks that a wrong stop bit in a reply makes its exchange bad and affects no other.
+// Checks that a wrong stop bit in a reply makes this exchange bad, and no other exchange.
 TEST_P(Characters, DamagedCharacters) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);

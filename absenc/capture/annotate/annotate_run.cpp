@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splits runs into frames: finds requests, replies, and the extent of bytes that are neither.
+// Splits runs of characters into frames: finds requests, replies, and the extent of bytes that are neither.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// characters to look ahead: more than two frames of usual length
+// number of characters to look ahead: more than two frames of usual length
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -20,7 +20,8 @@ Piece Annotator::piece(std::size_t size) const {
   return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
 }
 
-// Returns the size of a good reply to `request` at `from`, or 0. `usual`: its likely size or 0.
+// Returns the size of a good reply to `request` at index `from`, or 0 if there is none. `usual`: likely size of the
+// reply, or 0.
 std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
   const Bytes bytes = rest(from);
   const auto is_good = [&](std::size_t size) {
@@ -30,7 +31,7 @@ std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usu
   if (bytes.empty()) return 0;
   if (whole_ && bytes.size() <= lookahead && is_good(bytes.size())) return bytes.size();
   if (usual != 0 && usual <= bytes.size() && is_good(usual)) return usual;
-  // The missing characters of the reply may still arrive.
+  // With arrival times, the missing characters of the reply may still arrive.
   if (settings_.by_arrival && !whole_ && usual > bytes.size()) return 0;
   const std::size_t size = judge_.frame_size(Direction::reply, bytes);
   return size != 0 && size <= bytes.size() && is_good(size) ? size : 0;
@@ -43,7 +44,7 @@ std::size_t Annotator::request_at(std::size_t from) {
   return size != 0 && channel_->run.clean(from, size) ? size : 0;
 }
 
-// Returns whether several good frames follow from `from` on: a single one may be an accident.
+// Returns whether several good frames follow each other from index `from` on: a single one may be an accident.
 bool Annotator::good_from(std::size_t from) {
   const std::size_t end = channel_->run.size();
   const auto is_end = [&](std::size_t at) { return whole_ && at == end; };
@@ -104,7 +105,7 @@ std::size_t Annotator::match_reply() {
   const Exchanges::PendingRequest& pending = exchanges_.waiting()[*which];
   const bool overdue = exchanges_.overdue(pending, begin);
   if (pending.error != Error::none) {
-    // The outstanding request is damaged; a good reply in time shows that an encoder answered it.
+    // The outstanding request is damaged; a good reply in time shows that an encoder answered it all the same.
     const std::size_t size = overdue ? 0 : reply_at({}, at_);
     if (size != 0) exchanges_.report_reply(*which, piece(size), pending.error, pending.remark, {});
     return size;
@@ -113,26 +114,27 @@ std::size_t Annotator::match_reply() {
   const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
-    // Some replies equal their requests, and a reply may be sent twice: these are no echoes.
+    // Some replies equal their requests, and an encoder may send a reply twice: such bytes are no echo.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
-    // Bytes that equal the request and come late are the request again, no echo.
+    // Bytes that equal the request but come late are a repetition of the request, no echo.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
-    // A tap (arrival times) receives no echo: bytes that equal the request are a repeated request.
+    // A tap, whose characters have arrival times, receives no echo: bytes that equal the request are a repeated
+    // request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
     const std::size_t echoed = may_be_accident && may_be_echo ? echoed_reply_size(pending.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return match_echoed_reply(*which, echoed);
     if (size == 0) return 0;
   }
-  // Some replies equal their requests; an overdue one is rather a request.
+  // Some replies equal their requests. If the reply is overdue, such bytes are more likely a request.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
   if (leaves_rest && usual != 0 && size != usual && !is_followed_by_frame(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
   if (settings_.by_arrival) {
     channel_->at_frame_start = true;
-    channel_->last_size = 0;  // a request was sent, so the stream of unsolicited frames has ended
+    channel_->last_size = 0;  // the host sent a request, so a stream of unsolicited frames has ended
   }
-  // A look-ahead may have changed the content stored in `judge_`: decode this reply again.
+  // Looking ahead may have changed the content stored in `judge_`, so this reply is decoded again.
   if (leaves_rest || overdue) {
     static_cast<void>(judge_.decode({.bytes = pending.bytes()}, {.bytes = rest(at_).first(size)}));
   }
@@ -140,7 +142,7 @@ std::size_t Annotator::match_reply() {
   return size;
 }
 
-// Returns whether a good request or the same reply again follows the `size` bytes at `at_`.
+// Returns whether the `size` bytes at `at_` are followed by a good request, or by the same bytes again.
 bool Annotator::is_followed_by_frame(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
@@ -148,14 +150,15 @@ bool Annotator::is_followed_by_frame(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// Returns whether all characters from `from` on are the encoder's refusal of `request`.
+// Returns whether the characters from index `from` to the end of the run are the encoder's refusal of `request`.
 bool Annotator::is_refusal(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   return channel_->run.clean(from, bytes.size()) &&
          judge_.decode({.bytes = request}, {.bytes = bytes}) == Error::request_rejected;
 }
 
-// Returns the size of an echo of `request` at `from` with the reply or refusal behind it, or 0.
+// Returns the size of an echo of `request` at index `from` together with the reply or refusal after it, or 0 if there
+// is no echo.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
@@ -181,7 +184,7 @@ std::size_t Annotator::match_repeated() {
   const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
   if (!std::equal(before.begin(), before.end(), rest(at_).begin())) return 0;
   if (judge_.streams()) return 0;
-  // A request may equal the reply before it; a good reply behind it shows that it is a request.
+  // A request may equal the reply before it; a good reply after these bytes shows that they are a request.
   if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
     return 0;
   }
@@ -193,14 +196,15 @@ std::size_t Annotator::match_request() {
   const std::size_t size = request_at(at_);
   if (size == 0 || !is_request(size)) return 0;
   if (channel_->carries == Carries::both) exchanges_.report_unanswered(exchanges_.waiting().size());
-  // The capture may begin with a reply that equals its request.
+  // At the begin of a capture, the bytes may be a reply that equals its request.
   const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
   exchanges_.add_request(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
   last_reply_size_ = 0;
   return size;
 }
 
-// Returns whether the host sent the bytes at `at_`, a good request: they may also begin a reply.
+// Returns whether the good request of `size` bytes at `at_` was sent by the host: the same bytes may also begin a
+// reply.
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
@@ -208,11 +212,11 @@ bool Annotator::is_request(std::size_t size) {
   if (is_rest) {
     const auto waiting = exchanges_.waiting();
     if (waiting.empty() || at_ != 0) return channel.at_frame_start;
-    // It is assumed that no host repeats a request within twice the turnaround time.
+    // No host is expected to repeat a request within twice the turnaround time.
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
-  // Unless the encoder streams, the host is the next sender after a complete exchange.
+  // After a complete exchange the host sends next, unless the encoder sends unsolicited frames.
   const bool is_turn_of_host = settings_.by_arrival && channel.at_frame_start && channel.last_size == 0 &&
                                exchanges_.has_request() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
@@ -232,7 +236,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
-  // Unless the encoder streams, no frame behind an outstanding request is taken as unsolicited.
+  // After an outstanding request no frame is taken as unsolicited, unless the encoder is known to stream.
   if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;
@@ -242,7 +246,7 @@ std::size_t Annotator::match_unsolicited() {
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_request();
-  // A look-ahead may have changed the content stored in `judge_`: decode this frame again.
+  // Looking ahead may have changed the content stored in `judge_`, so this frame is decoded again.
   static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));
   exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
                              good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
@@ -253,17 +257,17 @@ std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
   report_bad(size);
   last_reply_size_ = 0;
-  channel_->at_frame_start = true;  // mostly the bad bytes end where a good frame begins, or with the run
+  channel_->at_frame_start = true;  // bad bytes mostly end where a good frame begins, or where the run ends
   if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
 
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
-  // In a stream, a bad frame mostly has the size of the others.
+  // In a stream of unsolicited frames a bad frame mostly has the size of the good frames.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // A good unsolicited frame may end with the run: the bytes before it are the bad ones.
+  // If the run ends with a good unsolicited frame, the bytes before it are the bad ones.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;
@@ -278,7 +282,7 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
-  // A damaged reply may have its usual length, with a pause behind it.
+  // A damaged reply may still have its usual length, with a pause after it.
   if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
     const std::size_t usual = reply_sizes_[size_index(exchanges_.waiting()[*pending].bytes())];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {

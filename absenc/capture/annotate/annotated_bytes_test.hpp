@@ -9,7 +9,7 @@
 
 namespace absenc::capture::testing {
 
-/// Kind, remark, error and bytes of an annotation.
+/// A copy of an annotation's kind, remark, error and bytes.
 struct AnnotatedBytes {
   Annotation::Kind kind;
   Remark remark;

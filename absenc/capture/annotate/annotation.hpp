@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An annotation: a request with its reply, one of them alone, or noise.
+// An annotation: a request with its reply, a request or a reply alone, or noise.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace absenc::capture {
 
-/// Information about an exchange that its frames do not contain.
+/// Remarks on an exchange: information that its frames do not contain.
 enum class Remark : std::uint8_t {
   none,
   unanswered,    // no reply followed the request
@@ -25,7 +25,7 @@ enum class Remark : std::uint8_t {
   late,          // the reply arrived after the time in which a host expects it
   damaged,       // a character had a wrong parity or stop bit, or the CAN bus had an error
   undocumented,  // no document states the reply to this request
-  cut,           // the capture begins or ends here: the frame or its exchange may be incomplete
+  cut,           // the capture begins or ends here, so the frame or its exchange may be incomplete
 };
 
 /// Returns the remark as a clause without a full stop; "" for Remark::none.
@@ -34,7 +34,7 @@ enum class Remark : std::uint8_t {
 /// Decoded content of a good frame.
 struct Contents {
   std::span<const FieldValue> fields{};  // decoded fields, in the order in which the unit reports them
-  const Reading* reading = nullptr;      // position in the frame; null if the frame carries none
+  const Reading* reading = nullptr;      // position that the frame contains; null if it contains none
 };
 
 struct Annotation {
@@ -47,15 +47,17 @@ struct Annotation {
 
   Kind kind = Kind::noise;
   Remark remark = Remark::none;
-  Error error = Error::none;  // error of the whole exchange; if it is not none, no value in `contents` may be used
-  bool composed = false;      // the frame was composed of several exchanges that carried one byte of it each
+  // error of the whole exchange; unless it is Error::none, no value in `contents` may be used
+  Error error = Error::none;
+  bool composed = false;  // the frame was composed of several exchanges that carried one byte of it each
   Tick begin = 0;
   Tick end = 0;
   // `request`, `reply` and `contents` refer to data that is valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
-  Contents contents{};               // decoded content of request and reply; empty for bad frames
-  std::optional<Tick> turnaround{};  // ticks from the request's end to its reply's begin; CAN: between their times
+  Contents contents{};  // decoded content of request and reply; empty for bad frames
+  // ticks from the end of the request to the begin of the reply; CAN: between the times of both frames
+  std::optional<Tick> turnaround{};
 };
 
 /// Receives annotations, not always in the order of their times.

@@ -14,11 +14,11 @@
 
 namespace absenc::capture {
 
-/// Completes good readings with the encoder's earlier alarms, by Unit::remembered if it is not null, and passes all
-/// annotations on. An unanswered request clears the stored alarms of all encoders.
+/// Completes good readings with the encoder's earlier alarms, using Unit::remembered, and passes all annotations on. If
+/// Unit::remembered is null, readings stay as they are. An unanswered request clears the stored alarms of all encoders.
 class CompletedReadings final : public AnnotationSink {
  public:
-  /// `unit` and `sink` must outlive this object.
+  /// Passes annotations of frames of `unit` to `sink`. Both must outlive this object.
   CompletedReadings(const Unit& unit, const Options& options, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {
     if (unit.remembered == nullptr) return;
     for (const Command& command : unit.commands) {
@@ -77,8 +77,9 @@ class CompletedReadings final : public AnnotationSink {
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms or reset the turns
-  // Last completed reading of each encoder, or only its alarms, by the encoder's address.
+  // byte sequences of the requests that clear alarms or reset the turns
+  std::vector<std::vector<std::uint8_t>> clearing_;
+  // Last completed reading of each encoder, by the encoder's address; without a reading, only its alarms are set.
   std::map<std::int64_t, Reading> last_;
 };
 

@@ -13,7 +13,7 @@
 namespace absenc::capture {
 namespace {
 
-// The status bit of a position does not name the alarm.
+// The status bit in the reply with a position only shows that there is an alarm, but not which.
 constexpr auto read_0 = hex<"0200">;
 constexpr auto position_0 = hex<"04004523710000fe">;
 constexpr auto position_0_with_status = hex<"04104523710000ae">;

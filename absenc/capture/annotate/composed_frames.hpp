@@ -15,7 +15,7 @@ namespace absenc::capture {
 /// Passes annotations on to a sink, and inserts annotations of the frames that several exchanges compose.
 class ComposedFrames final : public AnnotationSink {
  public:
-  /// `unit` and `sink` must outlive this object.
+  /// Passes annotations of frames of `unit` to `sink`. Both must outlive this object.
   ComposedFrames(const Unit& unit, const Options& options, AnnotationSink& sink)
       : judge_(unit, options), sink_(sink), storage_(std::make_unique<std::byte[]>(unit.follower_storage)) {
     if (unit.follower != nullptr) follower_ = unit.follower(options, {storage_.get(), unit.follower_storage});
@@ -27,7 +27,7 @@ class ComposedFrames final : public AnnotationSink {
   }
 
  private:
-  // Limit of stored begin times: more exchanges than any composed frame consists of.
+  // Limit for the number of stored begin times: more exchanges than any composed frame consists of.
   static constexpr std::size_t most_begins = 4096;
 
   void follow(const Annotation& annotation) {
@@ -60,7 +60,7 @@ class ComposedFrames final : public AnnotationSink {
   AnnotationSink& sink_;
   std::unique_ptr<std::byte[]> storage_;
   Follower* follower_ = nullptr;
-  std::deque<Tick> begins_;  // begin times of the last good exchanges, the newest last
+  std::deque<Tick> begins_;  // begin times of the last good exchanges, the newest at the end
   std::uint64_t count_ = 0;
 };
 

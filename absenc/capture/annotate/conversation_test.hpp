@@ -29,7 +29,7 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
 /// Returns the line settings of `unit`, with a default rate if the unit's document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// Bytes that the host or the encoder sent as one message; times in ticks.
+/// Bytes that the host or the encoder sent as one message. Begin and end are in ticks.
 struct Transmission {
   sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
@@ -71,7 +71,7 @@ class Talker {
     }
   }
 
-  /// Runs one random command and returns the traffic.
+  /// Runs one random command and returns what host and encoder sent.
   TalkRecord talk() {
     record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));
@@ -88,7 +88,7 @@ class Talker {
       if (host_) {
         line_.replace(*host_, *conversation);
       } else {
-        // A host that executes a `read` command stops after its first result.
+        // The host stops a `read` command of an encoder that streams after its first result.
         host_ = line_.attach(sim::NodeRole::host, *conversation, [this] { return !streams_; });
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
@@ -117,7 +117,7 @@ class Talker {
       for (const Transmission& one : record_.transmissions)
         record_.collided = record_.collided || (one.by != by && one.end > begin);
     }
-    // The frames of one request may have pauses between them.
+    // If a request is sent in frames, there are pauses between them.
     const Tick pause = by == sim::NodeRole::host ? static_cast<Tick>(unit_.timing.frame_pause.count()) : 0;
     const bool is_newest = last == record_.transmissions.rbegin();
     const bool goes_on =
@@ -133,7 +133,7 @@ class Talker {
   void record(const sim::Line<std::uint8_t>::Transfer& transfer) {
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
     const bool held_low = transfer.held_low != never;
-    if (held_low) {  // a bit of the idle line is sampled when the clock rises again
+    if (held_low) {  // the rise of the clock line before the word samples one bit of the idle line
       ++idle;
       if (!record_.bursts.empty()) record_.bursts.back().low_after = true;
     }

@@ -126,7 +126,7 @@ class Samples {
     return wanted * size;
   }
 
-  const std::size_t size;  // number of bytes per sample
+  const std::size_t size;  // size of a sample in bytes
   const std::uint64_t count;
   std::exception_ptr exception{};  // exception that ended the computation of samples; null: none
 
@@ -160,11 +160,11 @@ class Samples {
 /// One part of the samples, which is one file in the sigrok archive.
 struct SamplesPart {
   Samples* samples;
-  std::uint64_t size;  // number of bytes in the part
+  std::uint64_t size;  // number of bytes in this part of the samples
   std::uint64_t given = 0;
 };
 
-// Callback of libzip that provides the bytes of a file in the archive.
+// Reads the bytes of a file in the archive: a callback of libzip.
 zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
   SamplesPart& part = *static_cast<SamplesPart*>(state);
   switch (command) {
@@ -178,7 +178,7 @@ zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t
         const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
         part.given += filled;
         return static_cast<zip_int64_t>(filled);
-      } catch (...) {  // no exception may pass through libzip, which is C
+      } catch (...) {  // libzip is written in C, so no exception may pass through it
         part.samples->exception = std::current_exception();
         return -1;
       }
@@ -272,7 +272,7 @@ bool Drawing::next_label(Tick& at, std::string& words) {
 
 void write_vcd(std::ostream& out, Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
-  // Comments stand before all changes: sigrok's reader stops at a comment among the changes.
+  // All labels are written before the first change, because sigrok's reader stops at a comment among the changes.
   drawing.rewind_labels();
   Tick labelled = 0;
   for (std::string words; drawing.next_label(labelled, words);) {

@@ -32,10 +32,10 @@ class Drawing {
  public:
   struct Wire {
     std::string name;
-    bool before;  // level before the first change
+    bool before;  // level of the wire before its first change
   };
 
-  /// `title` must be one word. Throws std::runtime_error if a file is null.
+  /// Makes an empty drawing. `title` must be one word without blanks. Throws std::runtime_error if a file is null.
   explicit Drawing(std::string title, ScratchFile changes = temporary_file(), ScratchFile labels = temporary_file());
 
   void add_wire(std::string name, bool before) { wires_.push_back({std::move(name), before}); }
@@ -74,7 +74,7 @@ class Drawing {
   std::function<void()> on_progress_;
 };
 
-/// Stores the changes and comments of a waveform in a drawing, all of them `lead` later.
+/// Stores the changes and comments of a waveform in a drawing, with `lead` added to all times.
 template <class Waveform>
 class WaveformSink final : public Waveform::Sink {
  public:
@@ -83,7 +83,7 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Adds the wires and ends the drawing `margin` after the waveform, but not before `least`.
+  /// Adds the wires to the drawing and sets its end: `margin` after the end of the waveform, but at least `least`.
   void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
@@ -100,7 +100,7 @@ class WaveformSink final : public Waveform::Sink {
 /// Writes `drawing` as a value change dump (IEEE 1364, clause 18); labels become comments.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// Writes `drawing` like the CSV export of Saleae Logic 2.
+/// Writes `drawing` as CSV in the form of Saleae Logic 2's export.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
 /// Writes `drawing` as a sigrok session with `rate` samples per second, at most 1 GHz. Replaces the file at `path`.

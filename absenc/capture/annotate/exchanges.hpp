@@ -15,13 +15,13 @@ namespace absenc::capture {
 
 /// Time limits of a line, in ticks of the capture.
 struct LineTicks {
-  static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; sums with it do not overflow
+  static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; adding times to it cannot overflow
 
-  Tick pause = 1;        // a shorter silence ends no run of characters
-  Tick frame_pause = 0;  // a shorter silence ends a run only behind a complete request; 0: unused
-  Tick character = 1;    // duration of a character; a silence within a character is shorter
+  Tick pause = 1;        // a silence shorter than this, in ticks, does not end a run of characters
+  Tick frame_pause = 0;  // a silence shorter than this ends a run only after a complete request; 0: unused
+  Tick character = 1;    // duration of a character; a silence between the edges of one character is shorter
   Tick turnaround = 0;   // turnaround time that the unit's document states; 0: not known
-  Tick limit = never;    // longest time from request to reply, after which no host expects the reply
+  Tick limit = never;    // longest time from request to reply; after it no host expects the reply
 };
 
 /// Bytes and the time during which they were on the line.
@@ -35,34 +35,36 @@ class Exchanges {
  public:
   /// A request whose reply has not been found yet.
   struct PendingRequest {
-    static constexpr std::size_t capacity = 272;  // in bytes; a longer request is cut: it is bad in any case
+    // number of bytes that are stored; a longer request is cut, as it cannot be good
+    static constexpr std::size_t capacity = 272;
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;
     Tick begin = 0;
     Tick end = 0;
     Error error = Error::none;
     Remark remark = Remark::none;
-    bool is_request = true;  // false: bytes that are no frame, on a line with both directions; a reply may follow
+    // true: a request; false: bytes that are no frame, on a line with both directions; a reply may follow
+    bool is_request = true;
 
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  /// `sink` must outlive this object.
+  /// Makes a list without requests. `sink` must outlive this object.
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
 
   [[nodiscard]] std::span<const PendingRequest> waiting() const { return {pending_.data(), count_}; }
   /// Returns whether a good request was added so far.
   [[nodiscard]] bool has_request() const { return has_request_; }
-  /// Returns whether, at `now`, no host expects a reply to `pending` any more.
+  /// Returns whether, at the time `now`, no host expects a reply to `pending` any more.
   [[nodiscard]] bool overdue(const PendingRequest& pending, Tick now) const { return now > pending.end + ticks_.limit; }
 
-  /// Adds an outstanding request; if there are already four, reports the oldest of them.
+  /// Adds an outstanding request. If four requests are stored already, reports the oldest of them as unanswered.
   void add_request(const Piece& request, Error error, Remark remark, bool is_request);
   /// Reports `reply` as the reply to `waiting()[which]`, and reports all older requests. `contents` must be empty if
   /// `error` is not none.
   void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
-  /// Reports the `count` oldest outstanding requests, without replies.
+  /// Reports the `count` oldest outstanding requests as unanswered.
   void report_unanswered(std::size_t count);
   /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,

@@ -19,7 +19,7 @@ namespace absenc::capture {
 
 class Judge {
  public:
-  /// `unit` must outlive the judge.
+  /// Makes a judge for frames of `unit`, which must outlive it.
   Judge(const Unit& unit, const Options& options)
       : unit_(&unit),
         options_(options),
@@ -43,16 +43,16 @@ class Judge {
     return {decoded_.fields, decoded_.has_reading ? &decoded_.reading : nullptr};
   }
 
-  /// Returns the size of the complete frame, good or not, that `bytes` begin with, or 0.
+  /// Returns the size of the complete frame, good or not, at the begin of `bytes`; 0 if there is none.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
   }
-  /// Returns whether `bytes` are the beginning of a frame that is not complete yet.
+  /// Returns whether `bytes` are the beginning of a frame that is not yet complete.
   [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
     return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
   }
-  /// Returns the size of the complete good request that `bytes` begin with, or 0.
+  /// Returns the size of the complete good request at the begin of `bytes`; 0 if there is none.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
@@ -87,7 +87,8 @@ class Judge {
       reading = one;
       has_reading = true;
     }
-    // The unit's bytes are valid only during its call of the sink; the storage of copies may move.
+    // Copies the bytes of a field, which the unit keeps valid only while it calls the sink. Adding to the storage may
+    // move earlier copies.
     void store_bytes() {
       const Bytes added = fields.back().bytes;
       bytes.insert(bytes.end(), added.begin(), added.end());
@@ -97,7 +98,8 @@ class Judge {
         at += field.bytes.size();
       }
     }
-    // The description of a user's word is valid only during the unit's call of the sink.
+    // Copies the description of a field in a word that the user has described; the unit keeps it valid only while it
+    // calls the sink.
     void store_info() {
       described.push_back({std::string(fields.back().info->name), *fields.back().info});
       described.back().info.name = described.back().name;
@@ -108,7 +110,7 @@ class Judge {
       std::string name;
       FieldInfo info;
     };
-    bool is_described;  // the unit's word is described by the user, so its field descriptions must be copied
+    bool is_described;  // true: the user has described the word, so the descriptions of its fields must be copied
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
     std::deque<DescribedField> described;
@@ -118,7 +120,7 @@ class Judge {
 
   const Unit* unit_;
   Options options_;
-  std::unique_ptr<std::byte[]> storage_;  // of the decoder
+  std::unique_ptr<std::byte[]> storage_;  // memory in which the unit constructs its decoder
   FrameDecoder* decoder_ = nullptr;
   DecodedFields decoded_;
 };

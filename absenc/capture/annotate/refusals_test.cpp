@@ -25,7 +25,7 @@ Wire joined(const Wire& first, const Wire& second) {
   return both;
 }
 
-/// Checks that `runs`, between two good exchanges, are annotated as one refused request.
+/// Checks that `runs`, placed between two good exchanges, are annotated as one request that the encoder refused.
 void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
   std::vector<Wire> all{request, reply};
   all.insert(all.end(), runs.begin(), runs.end());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Consecutive characters of one channel.
+// A run: consecutive characters of one channel.
 #pragma once
 
 #include <algorithm>

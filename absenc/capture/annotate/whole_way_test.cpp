@@ -24,7 +24,7 @@ namespace {
 using testing::Talker;
 using testing::TalkRecord;
 
-/// Annotations as lines of text; their times are separate, because a waveform may round them.
+/// Annotations as lines of text; their times are stored apart, because a waveform may round them.
 struct Lines final : AnnotationSink {
   void put(const Annotation& one) override {
     std::string line = std::to_string(static_cast<int>(one.kind)) + " " + std::string(text_of(one.error).name) + " ";
@@ -111,7 +111,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Requires `reader` to give the expected annotations, at their times up to a bit.
+  // Requires that `reader` gives the expected annotations, with begin times that differ by at most one bit.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;
@@ -121,7 +121,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     settings.ticks = in_ns;
     ASSERT_EQ(found.lines, expected.lines);
     for (std::size_t i = 0; i < found.times.size(); ++i) {
-      // A burst begins with the first edge of its clock, or with chip select before it.
+      // The begin times differ, because a burst begins with chip select or the first clock edge.
       EXPECT_NEAR(static_cast<double>(found.times[i]) / ticks_per_ns, static_cast<double>(expected.times[i]),
                   1e9 / line.rate)
           << expected.lines[i];
@@ -132,7 +132,8 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
 
 TEST_P(WholeWay, EqualsDirectAnnotation) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
-  faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these faults make both sides send at once
+  // delayed and repeated replies would make host and encoder send at once
+  faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;
   faults.character_bytes = static_cast<std::uint8_t>(line.character_bytes());
   Talker talker(unit, options, faults, 7);
   Drawing drawing("capture");
@@ -145,7 +146,7 @@ TEST_P(WholeWay, EqualsDirectAnnotation) {
   talker.draw(waveform);
   std::vector<Character> all;
   const unsigned least = test_cases(300);
-  // Some conversations have few or no characters, so more of them are run.
+  // Some commands send few or no characters, so more of them are run.
   for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {
     const TalkRecord talk = talker.talk();
     ASSERT_FALSE(talk.collided);

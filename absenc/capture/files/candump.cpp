@@ -35,7 +35,7 @@ bool append_byte(std::string_view digits, CanFrame& frame) {
   return true;
 }
 
-// Parses the data behind '#' in a log line, like "R", "R4", "1122", "11.22".
+// Parses the part of a log line after '#', like "R", "R4" (remote frames), "1122" or "11.22".
 bool parse_compact(std::string_view data, CanFrame& frame) {
   if (data.size() >= 2 && data[data.size() - 2] == '_' && hex_digit(data.back()) > 8) data.remove_suffix(2);
   if (data.starts_with('R')) {
@@ -108,7 +108,7 @@ class CandumpReader final : public ParsedReader {
         break;
       }
     }
-    // The next frame may have the same time as the last one of this block.
+    // The first frame of the next block may have the same time as the last frame of this block.
     block.end = at_ + (timed_ && done_ ? 1 : 0);
     return true;
   }
@@ -130,7 +130,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // On one clock, only frames of different interfaces may have the same time.
+      // If all times are of one clock, only frames of different interfaces may have the same time.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {
@@ -227,7 +227,8 @@ bool parse_candump(std::string_view line, CandumpLine& parsed) {
   std::string_view word = take_word(line);
   if (const std::size_t hash = word.find('#'); hash != std::string_view::npos) {
     line = trim(line);
-    if (!line.empty() && line != "R" && line != "T") return false;  // R received, T transmitted: only in newer logs
+    // newer logs end lines with R (received) or T (transmitted)
+    if (!line.empty() && line != "R" && line != "T") return false;
     return parse_log(word.substr(0, hash), word.substr(hash + 1), parsed);
   }
   while (is_flag(word)) word = take_word(line);

@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 /// Content of one line of candump's output.
 struct CandumpLine {
-  enum class Kind : std::uint8_t { frame, other_can };  // other_can: CAN FD or XL
+  enum class Kind : std::uint8_t { frame, other_can };  // other_can: a frame of CAN FD or CAN XL
   Kind kind = Kind::frame;
   bool timed = false;
   Instant at;

@@ -106,7 +106,8 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    if (kind != "rx-data:" && kind != "tx-data:") return true;  // annotations of other classes contain no bytes
+    // annotations of other classes than data contain no bytes
+    if (kind != "rx-data:" && kind != "tx-data:") return true;
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;
   }

@@ -12,14 +12,14 @@
 
 namespace absenc::capture {
 
-/// Form of a text file with bytes; see hex_text.hpp.
+/// The forms of text files that contain bytes; see hex_text.hpp.
 enum class HexForm : std::uint8_t { plain, dump, xxd, sigrok };
 
 struct HexLine {
   std::optional<Instant> at;
-  std::optional<Tick> begin;  // form sigrok: index of the first sample of the bytes, if stated
+  std::optional<Tick> begin;  // in the form of sigrok: index of the first sample of the bytes, if the line states it
   Tick end = 0;
-  int channel = -1;  // direction of the bytes: 0 tx, 1 rx, -1 not stated
+  int channel = -1;  // direction of the bytes: 0 is tx, 1 is rx, -1 means that the line states none
   std::optional<std::uint64_t> offset;
   std::vector<std::uint8_t> bytes;
   std::string source;   // source that a log line names, such as a port; "": none

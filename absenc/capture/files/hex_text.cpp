@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 1 << 16;
 
-// The text beside the bytes of a dump may contain any character, so `#` begins no comment.
+// Returns `line` without its comment. In a dump the text beside the bytes may contain any character, so `#` begins no
+// comment.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
   if (form == HexForm::dump || form == HexForm::xxd) return trim(line);
   return strip_comment(line);
@@ -62,7 +63,7 @@ class HexTextReader final : public ParsedReader {
         break;
       }
     }
-    // The next line may begin at the same time as the last line of this block.
+    // The first line of the next block may begin at the same time as the last line of this block.
     block.end = done_ || clock_ == LineTime::none ? at_ : last_;
     return true;
   }
@@ -166,7 +167,8 @@ bool is_hex_text(std::string_view head) {
   while (!head.empty()) {
     const std::string_view line = head.substr(0, head.find('\n'));
     if (!strip_comment(line).empty()) {
-      if (line.size() == head.size() && head.size() > 4096) {  // `head` ends within a single long line
+      // the head of the file ends within one long line, of which only a part is checked
+      if (line.size() == head.size() && head.size() > 4096) {
         return first_form(head.substr(0, head.find_last_of(" ,;"))).has_value() ||
                first_form(head.substr(0, head.size() / 2 * 2)).has_value();
       }

@@ -12,10 +12,11 @@
 
 namespace absenc::capture {
 
-/// Returns whether the first line with content has a form that `read_hex_text` reads.
+/// Returns whether the first line of `head` with content has a form that `read_hex_text` reads.
 [[nodiscard]] bool is_hex_text(std::string_view head);
 
-/// Returns why the first line with content is no typed or logged one; "" if it is one, or no reason is known.
+/// Returns why the first line of `head` with content is neither typed nor logged bytes; "" if it is, or if no reason is
+/// known.
 [[nodiscard]] std::string hex_text_problem(std::string_view head);
 
 /// Reads lines of one of these forms; the first line with content decides which. HEX is bytes as in `append_group`.

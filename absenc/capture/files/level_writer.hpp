@@ -40,7 +40,7 @@ class LevelWriter {
     }
   }
 
-  /// Returns the number of level changes in the present block, cancelled ones included.
+  /// Returns the number of level changes in the present block, including those that cancelled each other.
   [[nodiscard]] std::size_t changes() const { return changes_; }
 
  private:

@@ -53,12 +53,13 @@ bool is_bytes(std::string_view word) {
   return append_any(word, bytes);
 }
 
-// Returns whether a terminal may show `bytes`, or the first of them, as `text`.
+// Returns whether a terminal program may show `bytes`, or only the first of them, as `text`.
 bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // each UTF-8 sequence counts as one character
+    // each UTF-8 sequence in the text counts as one character
+    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
   for (std::size_t i = 0; i < letters.size(); ++i) {
@@ -80,7 +81,8 @@ bool is_column(std::string_view text, Bytes bytes) {
     text.remove_prefix(1);
   }
   if (is_text_of(text, bytes)) return true;
-  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);  // blanks at the text's beginning were removed
+  // blanks at the beginning of the text were removed, so blanks at the beginning of the bytes are skipped
+  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
@@ -112,10 +114,10 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
 
 struct ParsedTime {
   std::optional<Instant> at;
-  std::size_t size = 0;  // number of characters that the time takes
+  std::size_t size = 0;  // number of characters of the line that state the time
 };
 
-// Returns how many first characters of `text` may be a clock time like "17:55:24.123".
+// Returns the number of characters at the beginning of `text` that may be a clock time like "17:55:24.123".
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
@@ -331,7 +333,7 @@ class Prefix {
     parsed_.source += name;
   }
 
-  // Handles a direction, port, filler or label; returns false if there is a problem.
+  // Handles a word before the bytes: a direction, port, filler or label. Returns false if the word causes a problem.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');
@@ -387,7 +389,7 @@ class Prefix {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
-  // Returns whether bytes or nothing follow the word.
+  // Returns whether bytes, or nothing at all, follow the word.
   [[nodiscard]] bool bytes_follow(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));

@@ -38,7 +38,8 @@ const TimeUnit* find_unit(std::string_view name) {
 }
 
 std::string_view take_field(std::string_view& row) {
-  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');  // most fields are a single digit
+  // shortcut: most fields are a single digit
+  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');
   const std::string_view field = row.substr(0, comma);
   row.remove_prefix(comma == std::string_view::npos ? row.size() : comma + 1);
   return field;
@@ -53,7 +54,7 @@ bool names_kinds(std::string_view line) {
   return first == "logic" || (first != line && (find_unit(first) != nullptr || first == "samples"));
 }
 
-// Time of a row: seconds or a clock time, a count of time units, or the row's own number.
+// How the rows state their time: as seconds or a clock time, as a count of time units, or not at all (row number).
 enum class RowTime : std::uint8_t { seconds, counts, rows };
 
 class LogicCsv final : public ParsedReader {
@@ -240,12 +241,12 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<char> columns_;  // for each column that is not skipped as time: 1 logic level, 0 left out
+  std::vector<char> columns_;  // use of each column that is not skipped as time: 1 has logic levels, 0 is left out
   RowTime clock_ = RowTime::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;
   bool started_ = false;
-  bool pending_ = false;  // the row that was read last belongs to the next block
+  bool pending_ = false;  // the row that was read last belongs to the next block and waits for it
   bool done_ = false;
   bool finished_ = false;
   std::uint64_t index_ = 0;

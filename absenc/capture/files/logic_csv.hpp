@@ -11,7 +11,7 @@
 
 namespace absenc::capture {
 
-/// Returns true if a file that begins with `head` is meant for `read_logic_csv`.
+/// Returns whether a file that begins with `head` has the form of a file for `read_logic_csv`.
 [[nodiscard]] bool is_logic_csv(std::string_view head);
 
 /// Reads the files of these programs, with a level of 0, 1 or X (unchanged) in each column of a channel:

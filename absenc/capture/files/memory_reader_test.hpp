@@ -19,7 +19,7 @@ inline std::uint64_t below(Random& random, std::uint64_t limit) {
   return std::uniform_int_distribution<std::uint64_t>(0, limit - 1)(random);
 }
 
-/// One level per tick, 0 or 1. No std::vector<bool>, which is slow without optimisation.
+/// The levels of one channel, 0 or 1 for each tick. It is no std::vector<bool>, which is slow without optimisation.
 using Drawn = std::vector<std::uint8_t>;
 
 inline void invert(Drawn& levels) {
@@ -34,7 +34,7 @@ struct Wires {
   [[nodiscard]] std::size_t ticks() const { return levels.front().size(); }
 };
 
-/// Returns the level changes of the samples `first` to `end` - 1; `before`: the level before.
+/// Returns the level changes of the samples `first` to `end` - 1; `before`: level of the sample before them.
 inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, std::size_t end) {
   Changes found{before, {}};
   bool level = before;
@@ -47,7 +47,7 @@ inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, s
 
 class MemoryReader final : public Reader {
  public:
-  /// Reads blocks of random sizes up to `most` ticks, without the ticks set by `leave_out`.
+  /// Makes a reader that returns blocks of random sizes up to `most` ticks. `leave_out` sets ticks that it skips.
   MemoryReader(const Wires& wires, Content content, std::size_t most, std::uint64_t seed)
       : wires_(wires), most_(most), random_(seed) {
     layout_.content = content;

@@ -11,10 +11,10 @@
 namespace absenc::capture {
 
 struct MendedZip {
-  std::unique_ptr<Source> archive;         // the remaining part of the archive, followed by a new directory
-  std::uint64_t end = 0;                   // offset of the end of the last entry, which may be cut off
-  bool complete = false;                   // the damaged directory begins at `end`: no entry is missing
-  std::optional<std::uint64_t> cut_entry;  // index of the last entry, if the file ends within it
+  std::unique_ptr<Source> archive;         // the part of the archive that remains, followed by a new directory
+  std::uint64_t end = 0;                   // offset in the file of the end of the last entry, which may be cut off
+  bool complete = false;                   // true: the damaged directory begins at `end`, so no entry is missing
+  std::optional<std::uint64_t> cut_entry;  // index of the last entry if the file ends within this entry
 };
 
 /// Builds a new directory of a zip archive from the local headers of its entries, up to the first that cannot be used.

@@ -39,7 +39,8 @@ bool is_text(std::string_view head) {
   });
 }
 
-// Returns nullptr, and leaves `source`, if the file is none of sigrok, Saleae, VCD and CSV.
+// Opens a capture of levels. Returns nullptr, and does not take `source`, if it is no file of sigrok, Saleae, VCD or
+// CSV.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
   if (is_zip(head)) return read_sigrok(std::move(source), name, choices.samples_per_second);

@@ -14,8 +14,10 @@ namespace absenc::capture {
 
 /// Properties of a capture that the user states, because the file may not contain them.
 struct OpenChoices {
-  unsigned channels = 0;                 // raw samples: 1 to 64, required; other levels: 0 or their number; else: 0
-  std::uint64_t samples_per_second = 0;  // raw samples: required; others: used where samples lack a rate
+  // number of channels; raw samples: 1 to 64, required; other levels: their number, or 0; other captures: 0
+  unsigned channels = 0;
+  // sample rate; raw samples: required; other files: used only if they state no rate for their samples
+  std::uint64_t samples_per_second = 0;
 };
 
 /// Opens a session of sigrok (sigrok.hpp), a value change dump (vcd.hpp), CSV of logic analysers (logic_csv.hpp),

@@ -45,7 +45,7 @@ struct Occurrences {
   }
 };
 
-/// A reader that does all its work in `claim`, one thread at a time.
+/// A reader that does all its work in `claim`, which one thread at a time calls.
 class ParsedReader : public Reader {
  public:
   [[nodiscard]] const Layout& layout() const override { return layout_; }
@@ -57,7 +57,7 @@ class ParsedReader : public Reader {
   Damages damages_;
 };
 
-/// Prepares a block for reuse; keeps its samples, and the levels before its changes.
+/// Prepares a block for reuse; keeps the storage of its samples, and the levels before its changes.
 inline void begin_block(Block& block, std::uint64_t index, Tick first) {
   block.index = index;
   block.first = first;

@@ -12,7 +12,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of bytes in a block, which may stay in the cache until it is decoded
+// number of bytes in a block: small enough to stay in the cache until the block is decoded
 constexpr std::uint64_t block_bytes = 1 << 20;
 
 class RawReader final : public Reader {

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::string_view magic = "<SALEAE>";
 constexpr double ticks_per_second = 1e12;
-// Limit for times in a file, 92 days: less than 64-bit ticks with a sign can hold.
+// Limit for the times in a file, 92 days: well within the range of signed 64-bit ticks.
 constexpr double longest_seconds = 8e6;
 constexpr std::size_t transitions_at_once = 1 << 13;
 
@@ -76,13 +76,13 @@ class TransitionStream {
   [[nodiscard]] std::int64_t end() const { return end_; }
   [[nodiscard]] bool exhausted() const { return remaining_ == 0 && chunks_ == 0; }
   [[nodiscard]] bool damaged() const { return !damage_.what.empty(); }
-  /// Returns the time of the last good transition, or of the chunk's begin, in picoseconds.
+  /// Returns the time of the last good transition, or of the chunk's begin if it has none, in picoseconds.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
-  /// Returns the time before which all transitions are known, in picoseconds.
+  /// Returns the time before which all transitions of this channel are known, in picoseconds.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
-  /// Reads ahead until a transition before `known()` is available, the file ends or is damaged.
+  /// Reads ahead until a transition before `known()` is available, or the file ends or is damaged.
   void refill(std::int64_t origin) {
     times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(next_));
     next_ = 0;
@@ -99,7 +99,7 @@ class TransitionStream {
     }
   }
 
-  /// Appends the times of the transitions before `limit` to `at`, in ticks from `origin`.
+  /// Removes the transitions before `limit` and appends their times to `at`, in ticks from `origin`.
   void take(std::int64_t limit, std::int64_t origin, std::vector<Tick>& at) {
     for (; next_ < times_.size() && times_[next_] < limit; ++next_) {
       at.push_back(static_cast<Tick>(times_[next_]) - static_cast<Tick>(origin));
@@ -176,8 +176,8 @@ class TransitionStream {
   std::int64_t begin_ = 0;
   std::int64_t end_ = std::numeric_limits<std::int64_t>::min();
   std::int64_t last_ = 0;
-  bool state_ = false;   // level after the transitions read so far
-  bool before_ = false;  // level after the transitions returned so far
+  bool state_ = false;   // level after all transitions read so far
+  bool before_ = false;  // level after all transitions that `take` has returned so far
   std::vector<std::int64_t> times_;
   std::size_t next_ = 0;
   Damage damage_;
@@ -205,7 +205,7 @@ class SaleaeReader final : public ParsedReader {
     if (done_) return false;
     begin_block(block, index_++, first_);
     block.changes.resize(streams_.size());
-    // Limit of the block: all transitions of every channel before this time are known.
+    // Before the end of the block, all transitions of every channel are known.
     std::optional<std::int64_t> limit;
     std::optional<std::int64_t> damaged;
     for (TransitionStream& stream : streams_) {

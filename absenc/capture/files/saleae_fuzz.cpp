@@ -16,14 +16,14 @@ FileBytes version_one() {
   return file.bytes;
 }
 
-// Reads `bytes` as one channel, together with a good channel.
+// Reads `bytes` as the file of one channel, together with the file of a good channel.
 void read_with(const FileBytes& good, FileBytes bytes) {
   std::vector<SaleaeChannel> channels;
   channels.push_back({"good", memory_source(good)});
   channels.push_back({"other", memory_source(std::move(bytes))});
   try {
     static_cast<void>(read_all(*read_saleae(std::move(channels))));
-  } catch (const OpenError&) {  // the reader has reported the reason
+  } catch (const OpenError&) {  // the reader has stated a reason why it cannot open the file
   }
 }
 

@@ -23,11 +23,11 @@ namespace absenc::capture {
 
 namespace {
 
-// most bytes of a piece that is expanded as a whole, which takes its memory in each thread
+// size in bytes up to which a piece is expanded as a whole; each thread needs that much memory
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
-// limit for the number of bytes of a capture; only a damaged file states more
+// limit for the number of bytes of a capture; only a damaged file can state more
 constexpr std::uint64_t believable = std::uint64_t{1} << 60;
 constexpr const char* copy_again = "copy the file again from where it came";
 
@@ -118,7 +118,7 @@ class SigrokReader final : public Reader {
   }
 
   void fill(Block& block) override {
-    if (block.file_size == 0) return;  // the block is a part of a streamed piece, which `claim` has already read
+    if (block.file_size == 0) return;  // the block is a part of a large piece, which `claim` has already read
     const auto index = static_cast<std::size_t>(block.file_offset);
     const SamplePiece& piece = pieces_[index];
     const auto size = static_cast<std::size_t>(piece.entry.size);
@@ -136,7 +136,7 @@ class SigrokReader final : public Reader {
     if (whole) {
       count += read_tail(*archive, index, into.subspan(size, piece.tail));
     } else if (!ends_at_cut(piece, archive.get())) {
-      count = 0;  // a wrong checksum does not show which samples are wrong
+      count = 0;  // a wrong checksum does not show which samples are wrong, so all samples of the piece are dropped
       report(piece, block.first, archive.get());
     }
     count -= std::min<std::size_t>(count, piece.skip);
@@ -151,9 +151,10 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
+    // Number of bytes at the beginning of this piece that belong to the last sample of the previous piece, because
     // sigrok may split a sample between two pieces.
-    unsigned skip = 0;  // bytes at the beginning of the piece that belong to the last sample of the previous piece
-    unsigned tail = 0;  // bytes of this piece's last sample that are in the next piece
+    unsigned skip = 0;
+    unsigned tail = 0;  // number of bytes of this piece's last sample that are in the next piece
   };
 
   // Opens the session as a zip archive; a file that lost the directory at its end gets a new one.
@@ -212,7 +213,7 @@ class SigrokReader final : public Reader {
     }
   }
 
-  // Returns the numbers N of all entries named NAME-N, in rising order.
+  // Returns the numbers N of all entries of the archive that are named NAME-N, in rising order.
   static std::vector<unsigned> numbers_of_pieces(const ZipArchive& archive, const std::string& name) {
     std::vector<unsigned> numbers;
     for (const std::string& entry : archive.names()) {
@@ -278,7 +279,7 @@ class SigrokReader final : public Reader {
     if (has_lost_entries()) {
       last.tail = 0;
       if (std::any_of(pieces_.begin(), pieces_.end(), [&](const SamplePiece& piece) { return is_cut(piece); })) {
-        layout_.ticks = 0;  // the length of a cut capture is known only after reading
+        layout_.ticks = 0;  // the length of a capture with a cut piece is known only after reading
       } else {
         damages_.add({.offset = cut_->end,
                       .tick = layout_.ticks,
@@ -300,12 +301,12 @@ class SigrokReader final : public Reader {
 
   [[nodiscard]] bool is_cut(const SamplePiece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
-  // Returns whether a piece ended because the file is cut off there.
+  // Returns whether the data of a piece ended because the file is cut off within it.
   [[nodiscard]] bool ends_at_cut(const SamplePiece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // Returns the number of bytes from offset `bytes` to the next border between samples.
+  // Returns how many bytes are missing at offset `bytes` until the sample is complete.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
@@ -321,7 +322,7 @@ class SigrokReader final : public Reader {
     block.end = first + count;
   }
 
-  // Completes a block that holds `count` samples in the file's sample size.
+  // Completes a block of `count` samples, which still have the sample size of the file.
   void finish(Block& block, std::size_t count) const {
     if (unit_size_ != bytes_per_sample_) {
       block.samples.resize(std::max(block.samples.size(), count * bytes_per_sample_));

@@ -79,7 +79,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  // The piece of the first session is one block, that of the second is read in parts.
+  // The only piece of the first session is read as one block; the piece of the second session is read in parts.
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
@@ -134,7 +134,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
-  // Changes one byte in the second of three pieces, each time another one.
+  // Each time another byte in the second of three pieces is changed.
   const std::string_view name = "logic-1-2";
   const auto local = std::search(good.begin(), good.end(), name.begin(), name.end());
   const auto begin = static_cast<std::size_t>(local - good.begin());
@@ -183,7 +183,8 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    constexpr std::string_view name = "logic-1-7";  // the name is stored in front of the piece and in the directory
+    // the archive contains the name twice: in front of the piece and in the directory
+    constexpr std::string_view name = "logic-1-7";
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
     *(in_directory - 30) ^= 1;  // changes a byte of the piece's checksum
     const auto reader = open_bytes(file);
@@ -239,14 +240,15 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
   for (const bool deflate : {true, false}) {
     const FileBytes good = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
     const std::size_t metadata = place_of(good, "metadata");
-    const std::size_t first = place_of(good, "logic-1-1") - 30;  // offset of the local header, 30 bytes before the name
+    // offset of the local header, which begins 30 bytes before the name
+    const std::size_t first = place_of(good, "logic-1-1") - 30;
     const std::size_t directory = place_of(good, "PK\x01\x02");
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
-      if (size < first + 39) {  // the first piece is completely missing
+      if (size < first + 39) {  // the file is cut off before the samples of the first piece
         const std::string why = problem(file);
-        // Without the last byte of these deflated entries, the data is complete all the same.
+        // The deflated data of these entries is complete even without its last byte.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -263,7 +265,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const Damage& damage = reader->damages()[0];
       EXPECT_EQ(damage.tick, contents.samples.size());
       EXPECT_LE(damage.offset, size);
-      // A damage may be reported at the beginning of an incomplete header.
+      // The damage may be reported at the beginning of the header that is incomplete.
       EXPECT_GE(damage.offset + 39, std::min(size, directory));
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
@@ -338,7 +340,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // the first piece, 333 samples and one byte, loses that byte
+  EXPECT_EQ(count(second - 40), 333u);  // the first piece has 333 samples and one byte, which is lost
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);

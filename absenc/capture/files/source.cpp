@@ -42,7 +42,7 @@ class FileSource final : public Source {
       const auto wanted = static_cast<std::streamsize>(std::min<std::uint64_t>(into.size(), size_ - offset));
       const std::streamsize got = handle->sgetn(reinterpret_cast<char*>(into.data()), wanted);
       count = got > 0 ? static_cast<std::size_t>(got) : 0;
-    } catch (const std::exception&) {  // libstdc++ throws when the disk fails; the read then returns 0
+    } catch (const std::exception&) {  // libstdc++ throws if the disk fails; `read` then returns 0
       return 0;
     }
     const std::lock_guard lock(mutex_);

@@ -135,7 +135,7 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
   return made;
 }
 
-/// Returns a zip archive with these entries, deflated or stored.
+/// Returns a zip archive with the given entries, all deflated or all stored.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
   return make_zip(entries, deflate ? zip_int32_t{ZIP_CM_DEFLATE} : zip_int32_t{ZIP_CM_STORE});
 }
@@ -177,7 +177,7 @@ inline FileBytes saleae_file(bool level, double begin, double end, const std::ve
   return writer.bytes;
 }
 
-/// Calls `read` with the fuzzer's input, and with a good file that the input changes.
+/// Calls `read` with the fuzzer's input, and with a good file that is changed by the input.
 template <class Read>
 void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good, Read read) {
   read(FileBytes(data, data + size));
@@ -190,7 +190,7 @@ void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good
   read(std::move(changed));
 }
 
-/// Requires that opening states why it fails, or that the capture is read to its end.
+/// Requires that opening a file either states why it fails or gives a capture that can be read to its end.
 inline void read_or_refuse(FileBytes bytes, const OpenChoices& choices = {}) {
   std::unique_ptr<Reader> reader;
   try {

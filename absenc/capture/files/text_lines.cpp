@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-// Parses all of `text` as a whole number of at most `most` digits, or returns nothing.
+// Parses all of `text` as a whole number of at most `most` digits; returns nothing if that fails.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {
   Number value = 0;
@@ -53,7 +53,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     } else if (is_digit(c) && decimal.count < decimal.digits.size()) {
       decimal.digits[decimal.count++] = c;
       if (!point) ++before;
-    } else if (!is_digit(c) || !point) {  // the number of digits behind the decimal point is not limited
+    } else if (!is_digit(c) || !point) {  // there may be any number of digits behind the decimal point
       return std::nullopt;
     }
   }
@@ -62,7 +62,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return decimal;
 }
 
-// Returns the number of `count` digits from index `first` on; digits outside are 0.
+// Returns the number that `count` digits of `decimal`, from index `first` on, form; missing digits are 0.
 std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t count) {
   std::int64_t value = 0;
   for (std::int64_t i = first; i < first + count; ++i) {
@@ -72,7 +72,7 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
   return value;
 }
 
-// Parses seconds like "12.000125" fast: files may have a million rows.
+// Parses seconds in the form "12.000125" fast, because files may have a million rows.
 bool read_plain_seconds(std::string_view text, Instant& instant) {
   constexpr std::ptrdiff_t most_digits = 18;
   constexpr std::array<std::int64_t, 13> picoseconds = {
@@ -92,7 +92,7 @@ bool read_plain_seconds(std::string_view text, Instant& instant) {
   return at == end;
 }
 
-// Parses seconds in any decimal form; returns false for another text or too many digits.
+// Parses seconds in any decimal form; returns false if `text` is no number or has too many digits.
 bool read_seconds(std::string_view text, Instant& instant) {
   const std::optional<Decimal> decimal = parse_decimal(text);
   if (!decimal || decimal->point > 18) return false;

@@ -14,7 +14,7 @@
 
 namespace absenc::capture {
 
-/// Length, in bytes, from which on `TextLines` refuses a line.
+/// Length of a line, in bytes, from which on `TextLines` refuses to read it.
 inline constexpr std::size_t longest_line = 1 << 20;
 
 [[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -23,7 +23,8 @@ class TextLines {
  public:
   explicit TextLines(Source& source) : source_(source) {}
 
-  /// Reads the next line, without its end, valid until the next call; false: none, or too long.
+  /// Reads the next line, without its line end, into `line`, which is valid until the next call. Returns false if there
+  /// is none or it is too long.
   [[nodiscard]] bool next(std::string_view& line);
 
   /// Returns the offset in the file of the line that `next` returned last.
@@ -48,7 +49,7 @@ inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 /// A time of day, with or without a date, or a time on any counter.
 struct Instant {
   std::int64_t seconds = 0;
-  std::int64_t picoseconds = 0;  // picoseconds to add to `seconds`, 0 to 10^12 - 1
+  std::int64_t picoseconds = 0;  // part of a second, in picoseconds from 0 to 10^12 - 1, which is added to `seconds`
 };
 
 /// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off.
@@ -60,7 +61,7 @@ struct Instant {
 /// Returns the ticks of `picoseconds` between two instants; nothing if negative or too large.
 [[nodiscard]] constexpr std::optional<Tick> ticks_between(const Instant& from, const Instant& to,
                                                           std::int64_t picoseconds) {
-  // Seconds of both instants are below 10^18, so their difference fits.
+  // The seconds of both instants are below 10^18, so their difference does not overflow.
   std::int64_t seconds = to.seconds - from.seconds;
   std::int64_t rest = to.picoseconds - from.picoseconds;
   if (rest < 0) {

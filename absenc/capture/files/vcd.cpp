@@ -20,7 +20,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-// changes after which a block ends at the next time: one identifier may drive many channels
+// number of changes after which a block ends at the next time; one identifier may drive many channels
 constexpr std::size_t block_changes = 1 << 20;
 
 enum class Value : std::uint8_t { low, high, unknown, none };
@@ -97,7 +97,7 @@ class VcdReader final : public ParsedReader {
       }
     }
     done_ = true;
-    // The end is one tick behind the last time if values follow it: they are within the capture.
+    // If the last time of the file is followed by values, the capture ends one tick after it, to include them.
     block.end = std::max(block.first, now_ + (last_changed_ ? 1 : 0));
     unknown_.report(damages_, "values are x or z: taken as the level before");
     return true;
@@ -201,9 +201,9 @@ class VcdReader final : public ParsedReader {
   std::string vector_;
   std::uint64_t index_ = 0;
   Tick now_ = 0;
-  bool started_ = false;  // a time or a value change was read
-  bool valued_ = false;   // a value change was read
-  bool initial_ = true;   // no time after that of the first value change was read
+  bool started_ = false;  // a time or a value change has been read
+  bool valued_ = false;   // a value change has been read
+  bool initial_ = true;   // all values read so far are at the time of the first one, so they are initial levels
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

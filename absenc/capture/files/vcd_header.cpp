@@ -101,7 +101,8 @@ void VcdHeader::read_timescale() {
 }
 
 void VcdHeader::read_scope() {
-  static_cast<void>(next("in $scope"));  // skips the type of the scope: module, task ...
+  // skips the word after $scope, which states the type of the scope (module, task ...)
+  static_cast<void>(next("in $scope"));
   const std::string scope = next("in $scope");
   if (scope == "$end") return scopes_.push_back(scopes_.empty() ? "" : scopes_.back());
   std::string path = scopes_.empty() ? scope : scopes_.back() + "." + scope;
@@ -132,7 +133,7 @@ void VcdHeader::read_variable() {
   if (!has_width || width < 1 || names_.size() + static_cast<std::size_t>(width) > most_channels) {
     fail("declares " + name.substr(0, 80) + " with an impossible width, or more than 65536 channels in all");
   }
-  // The range has another width than the variable: it is the index of an array element.
+  // A range whose width differs from the variable's is the index of an array element.
   if (std::abs(left - right) != width - 1) {
     name += ranged ? "[" + std::to_string(left) + "]" : "";
     left = width - 1;

@@ -39,14 +39,14 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_EQ(reader->layout().channels, (Names{"tx", "rx"}));
   const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(contents.changes[0].before);
-  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // the pulse of no length at tick 9 is no change
+  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // two changes at tick 9 cancel each other, so there is no change
   EXPECT_FALSE(contents.changes[1].before);
   EXPECT_EQ(contents.changes[1].at, (Ticks{9}));
   EXPECT_EQ(contents.end, 20u);
   EXPECT_TRUE(reader->damages().empty());
 }
 
-// A source of a large file that is not in memory: a text repeated many times, then another.
+// A source of a large file that is not in memory: a text that is repeated many times, then another text.
 class Repeated final : public Source {
  public:
   Repeated(std::string part, std::uint64_t count, std::string last)
@@ -73,7 +73,7 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
       "long.vcd");
 }
 
-// Checks that 70 MiB of comments are skipped, more than a header may have otherwise.
+// Checks that 70 MiB of comments are skipped, although a header must otherwise be shorter.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
   const CaptureContents contents = read_all(*reader);

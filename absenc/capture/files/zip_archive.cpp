@@ -15,14 +15,14 @@ namespace absenc::capture {
 
 namespace {
 
-// The source as libzip reads it, through a buffer that saves system calls.
+// The source in the form that libzip reads, with a buffer that saves system calls.
 struct Window {
   Source* source = nullptr;
   std::uint64_t position = 0;
   std::uint64_t buffered_at = 0;
   std::size_t buffered = 0;
   std::array<std::uint8_t, 1 << 16> buffer{};
-  bool mark = false;  // the next read is the first read of an entry
+  bool mark = false;  // true: the next read of the source is the first one for an entry
   std::uint64_t entry = 0;
   zip_error_t error{};
 
@@ -96,7 +96,7 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Returns the limit for the packed size: deflate adds only few bytes to incompressible data.
+// Returns a limit for the compressed size: deflate adds only few bytes to data that cannot be compressed.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace
@@ -104,7 +104,7 @@ constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 
 struct ZipArchive::State {
   Window window;
   std::unique_ptr<zip_t, Close> archive;
-  std::unique_ptr<zip_file_t, Close> file;  // the entry that is read; must be closed before its archive
+  std::unique_ptr<zip_file_t, Close> file;  // handle of the entry that is read; must be closed before its archive
   std::unique_ptr<libdeflate_decompressor, Close> inflater;
   std::vector<std::uint8_t> packed;
   std::string problem;

@@ -32,7 +32,7 @@ class ZipArchive {
   /// Returns the names of all entries, in the order of the archive.
   [[nodiscard]] std::vector<std::string> names() const;
 
-  /// Expands an intact deflated entry into `into`; returns false if that fails, as for other entries.
+  /// Expands an intact deflated entry into `into`. Returns false if that fails, or if the entry is not deflated.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
   /// Begins to read an entry instead of the previous one; returns false on error, see `problem`.
@@ -41,7 +41,7 @@ class ZipArchive {
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
   /// Returns whether the last `read` returned fewer bytes because the entry's data ended.
   [[nodiscard]] bool ran_out() const;
-  /// Returns whether the entry that was read ends here with a right checksum.
+  /// Returns whether the entry that was read ends here, and its checksum is right.
   [[nodiscard]] bool at_good_end();
 
   /// Returns a message about the last error of this archive, mostly libzip's.

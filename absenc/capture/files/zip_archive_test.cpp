@@ -34,7 +34,8 @@ constexpr std::size_t unpacked_size = 24;
 struct Expanded {
   bool whole = false;
   FileBytes bytes;
-  bool found_by_reading = false;  // `open` and `read` gave the right content and a good end
+  // true: `open` and `read` returned the right content, and the end of the entry was good
+  bool found_by_reading = false;
   std::string problem;
 };
 
@@ -70,7 +71,7 @@ TEST(ZipArchive, ReadingReportsDamage) {
     EXPECT_EQ(result.problem, "CRC error");
 
     file = good;
-    file[200] ^= 0x10;  // damages a byte of the entry's data
+    file[200] ^= 0x10;  // damages one byte of the entry's data
     result = expanded(file);
     EXPECT_FALSE(result.whole || result.found_by_reading);
     EXPECT_NE(result.problem, "");

@@ -12,10 +12,11 @@ namespace absenc::capture {
 namespace {
 
 constexpr Tick never = std::numeric_limits<Tick>::max();
-constexpr Tick characters_ahead = 12;  // number of characters examined to find the first start bit
-// number of falling edges tried as the first start bit; more within a character are noise
+constexpr Tick characters_ahead = 12;  // number of characters that are examined to find the first start bit
+// number of falling edges that are tried as the first start bit; more than these within one character are noise
 constexpr std::size_t candidates = 16;
-constexpr std::size_t step = 64;  // number of changes after which the true state is compared with the guess again
+// number of changes after which the true decoder state is compared again with that of the guess
+constexpr std::size_t step = 64;
 
 }  // namespace
 
@@ -24,8 +25,8 @@ struct AsyncDecoder::Candidate {
   Tick begin;
   unsigned levels;
   Tick last;      // time of the last change within the character
-  unsigned bits;  // number of bits from the character's `begin` to `last`
-  Tick next;      // falling edge at which decoding continues
+  unsigned bits;  // number of bits from the begin of the character to its last change
+  Tick next;      // falling edge at which the search for the next character begins
 };
 
 AsyncDecoder::Statistics& AsyncDecoder::Statistics::operator+=(const Statistics& other) {
@@ -51,7 +52,7 @@ AsyncDecoder::AsyncDecoder(const AsyncFormat& format, std::uint8_t channel, Star
       length_(static_cast<Tick>(std::llround(format.bit * (stop_ + format.stop_bits)))),
       per_tick_(1 / format.bit),
       start_(start) {
-  // An edge at tick t lies between t - 1 and t, so a fraction of a tick may be cut off.
+  // The true time of an edge at tick t is between t - 1 and t, so a fraction of a tick may be cut off.
   for (unsigned i = 0; i < middle_.size(); ++i) middle_[i] = static_cast<Tick>(format.bit * (i + 0.5));
 }
 
@@ -62,7 +63,8 @@ void AsyncDecoder::restart(Start start) {
   unsure_.reset();
 }
 
-// `edges_` must end with `never`. Returns the index of the edge at which to continue.
+// Calls `visit` for the characters from the edge `start` on; `edges_` must end with `never`. Returns the index of the
+// edge at which to continue.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();
@@ -77,7 +79,7 @@ std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit
     for (Tick distance; (distance = edges[j] - begin) <= stop; ++j) {
       bit = static_cast<unsigned>(
           static_cast<std::int64_t>(static_cast<double>(static_cast<std::int64_t>(distance)) * per_tick_));
-      bit += middle_[bit] < distance ? 1 : 0;  // the first bit whose middle is not before the change
+      bit += middle_[bit] < distance ? 1 : 0;  // index of the first bit whose middle is not before the level change
       levels ^= ~0u << bit;
     }
     const std::size_t next = (levels & 1) != 0 ? i + 2 : j + ((j ^ i) & 1);
@@ -243,7 +245,8 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // `other` counted wrong characters before the two met: they are counted again and subtracted.
+  // The errors that `other` counted before both decoders met are wrong: a decoder counts them again, and they are
+  // subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

@@ -18,8 +18,8 @@ struct AsyncFormat {
   bool idle_high = true;
   Parity parity = Parity::none;
   unsigned stop_bits = 1;  // number of stop bits, 1 or 2; only the first is checked, as in a receiver
-  Tick glitch = 0;         // a level shorter than this is noise, in ticks; 0: no filter
-  unsigned data_bits = 8;  // 5 to 16
+  Tick glitch = 0;         // level changes closer together than this, in ticks, are removed as noise; 0: no filter
+  unsigned data_bits = 8;  // number of data bits of a character, 5 to 16
 };
 
 /// A decoder of asynchronous characters, which decodes a capture part by part. A bit is the level at its middle,
@@ -31,7 +31,8 @@ class AsyncDecoder {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
     std::uint64_t characters = 0;
-    std::uint64_t faults = 0;  // characters with a wrong stop or parity bit, and falling edges that were no start bit
+    // number of characters with a wrong stop or parity bit, and of falling edges that were no start bit
+    std::uint64_t faults = 0;
 
     Statistics& operator+=(const Statistics& other);
     Statistics& operator-=(const Statistics& other);
@@ -39,20 +40,21 @@ class AsyncDecoder {
   /// How decoding begins: with a search for the first start bit, or with the first falling edge.
   enum class Start : std::uint8_t { search, trust };
 
-  /// `channel` is stored as the channel of each character.
+  /// Makes a decoder. `channel` is stored as the channel of each character.
   explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::search);
 
-  /// Begins anew with a part that does not follow the previous one; keeps the statistics.
+  /// Begins anew because the next part does not follow the previous one; keeps the statistics.
   void restart(Start start = Start::search);
   /// Decodes the next part, from tick `first` to `end`, and appends complete characters.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
-  /// Works like `decode`; `other` decoded the part into `guessed` after a restart with `trust`.
+  /// Works like `decode`, but takes over characters from `guessed`: `other` decoded them from this part after a restart
+  /// with `trust`.
   void join(const Changes& part, Tick first, Tick end, AsyncDecoder& other, std::vector<Character>& guessed,
             std::vector<Character>& characters);
   /// Ends the capture; appends the remaining characters.
   void finish(std::vector<Character>& characters);
 
-  /// Returns a time before which no further character begins.
+  /// Returns a time before which no character begins that is still to be returned.
   [[nodiscard]] Tick settled() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   [[nodiscard]] const AsyncFormat& format() const { return format_; }
@@ -66,7 +68,7 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // Decodes until a character begins at the same time as one of `targets`; returns its index.
+  // Decodes until a character begins at the same time as one of `targets`; returns the index of that target.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);
@@ -85,11 +87,11 @@ class AsyncDecoder {
   bool begun_ = false;
   Tick origin_ = 0;  // first tick of the first part
   Tick end_ = 0;     // end of the last part, in ticks
-  // level behind all changes fed so far; idle is high, also for an inverted line
+  // level after all changes given so far; idle is high, also for an inverted line
   bool line_ = true;
-  bool level_ = true;           // level before the first of `edges_`
-  std::vector<Tick> edges_;     // changes from the first incomplete character on
-  std::optional<Tick> unsure_;  // time of a change that may be part of a glitch
+  bool level_ = true;           // level before the first change in `edges_`
+  std::vector<Tick> edges_;     // level changes from the first incomplete character on, in ticks
+  std::optional<Tick> unsure_;  // time of a level change that may be part of a noise pulse
   Statistics statistics_;
 };
 

@@ -13,9 +13,10 @@ constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
 constexpr std::size_t fewest_changes = 4;  // number of changes below which no bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
-constexpr int most_bits = 4;    // each group of pulses is tried as pulses of 1 to 4 bits
-constexpr double worst = 0.5;   // errors per character above which a format is refused
-constexpr double alike = 0.01;  // formats are equal if their errors per character differ by less than this
+constexpr int most_bits = 4;   // each group of pulses is tried as pulses of 1 to 4 bits
+constexpr double worst = 0.5;  // a format with more errors per character than this is refused
+// two formats count as equally good if their errors per character differ by less than this
+constexpr double alike = 0.01;
 
 // Returns the lengths of the pulses between changes, without glitches, the shortest first.
 std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
@@ -28,7 +29,8 @@ std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   return lengths;
 }
 
-// Returns the mean bit time of pulses of up to `most` bits that nearly fit `bit`, or `bit`.
+// Returns the mean bit time of all pulses of up to `most` bits whose lengths nearly fit the bit time `bit`; without
+// such pulses, `bit`.
 double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   double ticks = 0;
   double bits = 0;
@@ -43,7 +45,8 @@ double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   return bits == 0 ? bit : ticks / bits;
 }
 
-// Returns the mean lengths of groups of similar pulses, the shortest first, without rare ones.
+// Sorts pulses into groups of similar length and returns the mean length of each group, the shortest first; leaves out
+// rare lengths.
 std::vector<double> clusters(const std::vector<Tick>& lengths) {
   const std::size_t rare = lengths.size() < 50 ? 1 : std::max<std::size_t>(2, lengths.size() / 200);
   std::vector<double> means;
@@ -87,7 +90,8 @@ AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format)
   return decoder.statistics();
 }
 
-// Counts pulses that are clearly shorter than a bit as errors: the bit time may be too long.
+// Returns the faults per character. Pulses that are clearly shorter than a bit count as faults, because they show that
+// the assumed bit time is too long.
 double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick>& lengths, double bit) {
   if (statistics.characters == 0) return 1;
   const auto shorter = std::find_if(lengths.begin(), lengths.end(),
@@ -96,7 +100,7 @@ double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick
          static_cast<double>(statistics.characters);
 }
 
-// Returns the level that lasted longest without a change, which is probably a pause.
+// Returns the level that lasted longest without a change, which is probably the idle level of a pause.
 bool longest_level(const Stretch& part) {
   Tick longest = 0;
   Tick since = part.first;

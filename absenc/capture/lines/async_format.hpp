@@ -15,9 +15,9 @@ struct AsyncSettings {
   double baud = 0;  // baud rate in bits per second; 0: detected from the changes
   Parity parity = Parity::none;
   unsigned stop_bits = 1;
-  Idle idle = Idle::automatic;  // `low` means an inverted line
-  Tick glitch = 0;              // a level shorter than this is noise, in ticks; 0: no filter
-  unsigned data_bits = 8;       // 5 to 16
+  Idle idle = Idle::automatic;  // idle level; `low` means an inverted line
+  Tick glitch = 0;              // level changes closer together than this, in ticks, are removed as noise; 0: no filter
+  unsigned data_bits = 8;       // number of data bits of a character, 5 to 16
 };
 
 /// Finds bit time and idle level, as far as `settings` leave them open, from the changes between `first` and `end`.

@@ -60,7 +60,7 @@ TEST(Async, ACharacterLastsFromItsStartBitToTheEndOfItsStopBit) {
 }
 
 TEST(Async, ANextCharacterThatComesEarlyEndsTheOneBefore) {
-  Pen pen(7.8, Parity::none, 1);  // bits of 7.8 ticks: the sender is 2.5 % too fast
+  Pen pen(7.8, Parity::none, 1);  // bits last 7.8 ticks instead of 8: the sender is 2.5 % too fast
   pen.hold(true, 12);
   pen.character(0x55);
   pen.character(0xAA);
@@ -222,7 +222,7 @@ TEST(Async, RestartsBehindAHole) {
   for (const unsigned threads : {1u, 3u}) {
     for (const Content content : {Content::samples, Content::changes}) {
       MemoryReader reader(wires, content, 100, 1);
-      // The missing part is from the middle of character 10 to the pause before character 20.
+      // The part left out is from the middle of character 10 to the pause before character 20.
       reader.leave_out(160 + 10 * 168 + 30, 160 + 20 * 168 - 85);
       std::vector<std::uint8_t> wanted;
       for (unsigned i = 0; i < 30; ++i) {
@@ -244,7 +244,8 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.characters.size(), 200u);
   EXPECT_EQ(all.characters.front().channel, 1);
   EXPECT_NEAR(all.outcome.formats[0].bit, 10.5, 0.05);
-  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);  // the rounding error is the same in each character
+  // all characters have the same rounding error, so the tolerance is wide
+  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
@@ -326,7 +327,7 @@ TEST(Async, PassesOnExceptionsOfReader) {
   }
 }
 
-// A reader that claims slowly: meanwhile the other threads must decode earlier blocks.
+// A reader whose `claim` is slow: meanwhile the other threads must decode earlier blocks.
 class Slow final : public Reader {
  public:
   explicit Slow(Reader& reader) : reader_(reader) {}
@@ -334,7 +335,7 @@ class Slow final : public Reader {
   [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
   [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
 
-  // Other threads than the joining one wait here until all claimed blocks were delivered.
+  // All threads but the joining one wait here until all claimed blocks were delivered.
   [[nodiscard]] bool claim(Block& block) override {
     std::unique_lock lock(mutex_);
     if (!is_joining() && claimed_ != arrived_) {

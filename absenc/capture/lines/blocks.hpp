@@ -88,7 +88,7 @@ class BlockRun {
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      const Stop stop{*this};  // destroyed before the worker threads, which wait for the stop
+      const Stop stop{*this};  // its destructor runs before the worker threads are joined, and stops them
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();
       stop.now();
@@ -103,7 +103,7 @@ class BlockRun {
     Block block;
     Levels levels;
     typename Decoding::Guess guess;
-    unsigned thread = 0;  // thread whose cache holds the block
+    unsigned thread = 0;  // index of the thread whose cache holds the block
     bool ready = false;
   };
   struct Stop {
@@ -129,7 +129,7 @@ class BlockRun {
 
   // Claims a block and prepares it; the lock is held before and after the call.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
-    // The block that this thread used last is still in its cache.
+    // Takes the block that this thread used last, because it is still in the cache of the processor.
     const auto last =
         std::find_if(free_jobs_.rbegin(), free_jobs_.rend(), [&](const Job* job) { return job->thread == thread; });
     const auto own = last == free_jobs_.rend() ? free_jobs_.begin() : last.base() - 1;
@@ -198,7 +198,7 @@ class BlockRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Job*> free_jobs_;
-  std::deque<Job*> in_order_;  // claimed blocks in the order of the capture
+  std::deque<Job*> in_order_;  // blocks that were claimed, in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

@@ -67,7 +67,7 @@ void CanDecoder::finish(std::vector<CanRecord>& frames) {
   if (state_ == State::stuffed || state_ == State::tail) state_ = State::waiting;
 }
 
-// Handles a level that lasted from `from` to `to`; of a long one, only as many bits as matter.
+// Handles a level that lasted from `from` to `to`. Only the first 32 bits of a long level matter.
 void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
   constexpr double enough = 32;
   const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
@@ -109,13 +109,13 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
     bits_.push_back(bit);
     interpret();
   }
-  // A stuff bit may follow the last bit of the CRC.
+  // The last bit of the CRC may be followed by a stuff bit.
   if (length_ == 0 || bits_.size() < length_ || run_ == most_equal) return;
   state_ = State::tail;
   tail_ = 0;
 }
 
-// Handles a bit behind the CRC. A receiver ignores the last bit of a frame's end.
+// Handles a bit after the CRC of a frame. A receiver ignores the last bit of the end of frame.
 void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   constexpr unsigned acknowledge = 1, last = 8;
   if (tail_ == acknowledge) {
@@ -129,7 +129,7 @@ void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   if (tail_++ < last) return;
   frames.push_back(record_);
   state_ = State::waiting;
-  recessive_ = last;  // the rest of the frame's end and the intermission complete the idle time
+  recessive_ = last;  // the remaining bits of the end of frame and the intermission complete the idle time
 }
 
 std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
@@ -138,7 +138,8 @@ std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
   return value;
 }
 
-// Bits: start, 11 of the id, RTR or SRR, IDE; r0, DLC or 18 of the id, RTR, r1, r0, DLC.
+// Finds the length of a frame. Its bits are: start, 11 bits of identifier, RTR or SRR, IDE; then r0, DLC, or 18 bits of
+// identifier, RTR, r1, r0, DLC.
 void CanDecoder::interpret() {
   if (length_ != 0 || bits_.size() < 19) return;
   const bool extended = bits_[13];

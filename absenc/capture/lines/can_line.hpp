@@ -39,12 +39,12 @@ class CanDecoder {
 
   double bit_;
   bool level_ = true;
-  Tick level_since_ = 0;  // begin of the present level, as far as known, in ticks
+  Tick level_since_ = 0;  // tick at which the present level began, as far as known
   Tick end_ = 0;
-  std::size_t bits_taken_ = 0;  // number of bits at the present level that were handled already
+  std::size_t bits_taken_ = 0;  // number of bits of the present level that were already handled
 
   State state_ = State::waiting;
-  unsigned recessive_ = 0;  // number of consecutive recessive bits
+  unsigned recessive_ = 0;  // number of consecutive recessive bits before the present time
   unsigned run_ = 0;        // number of consecutive equal bits in the stuffed part of a frame
   bool before_ = true;
   std::vector<bool> bits_;  // bits of the present frame without stuff bits, from the start of the frame on

@@ -132,7 +132,7 @@ TEST(CanDecoder, ReportsMissingAcknowledge) {
 TEST(CanDecoder, ReportsPlaceOfError) {
   CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x555, .size = 1, .data = {0x55}});
-  bits[26] = !bits[26];  // changes a bit of the data byte, where bits alternate
+  bits[26] = !bits[26];  // inverts a bit of the data byte; its bits alternate, so no stuff bit changes
   bus.add(bits);
   bus.pass(20);
   const std::vector<CanRecord> frames = bus.decoded();

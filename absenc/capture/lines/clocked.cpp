@@ -36,7 +36,8 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // Rests differ clearly by more than a seventh and more than the sampling error of two changes.
+    // Two lengths of rests are different if they differ by more than a seventh, and by more than the sampling error of
+    // two changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -88,7 +89,7 @@ void ClockedDecoder::begin_part(const ClockedPart& part) {
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// Begins a burst at `at`; returns true instead if a target begins there in the same state.
+// Begins a burst at the tick `at`. Returns true instead if one of `targets` begins at that tick in the same state.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
@@ -128,14 +129,14 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// Samples the last bit behind the last clock change, if `settle` asks for it and it is missing.
+// If the format asks for it, samples the last bit of a word after the last clock change.
 void ClockedDecoder::sample_last_bit() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);
   burst_.has_last = true;
 }
 
-// A data change at `until` itself counts: the order of two changes in one sample is unknown.
+// A data change at the tick `until` itself counts, because the order of two changes in one sample is unknown.
 void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
   if (open_) sample_last_bit();
@@ -175,7 +176,7 @@ bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst
   return false;
 }
 
-// Decodes a part; returns true if it stopped because a burst begins together with a target.
+// Decodes a part. Returns true if it stopped early because a burst begins together with one of `targets`.
 bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
   begin_part(part);
   for (;;) {
@@ -186,7 +187,7 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
   }
   if (!format_.has_select && open_ && part.end - last_ > format_.settle) sample_last_bit();
   detect_data_change(part.end);
-  // Levels behind the last clock change of this part are needed in the next part.
+  // The next part needs the levels of the data lines after the last clock change of this part.
   in_.before(no_change);
   out_.before(no_change);
   if (!format_.has_select && open_ && is_over(part.end - last_)) {

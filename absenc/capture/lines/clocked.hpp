@@ -17,13 +17,13 @@ struct ClockedFormat {
   bool has_select = false;   // true: chip select begins and ends words; the clock may pause within a word
   bool select_high = false;  // true: chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
-  // without chip select: ticks from the last clock change to the last bit's sample; 0: none
+  // without chip select: time from the last clock change to the sample of the word's last bit, in ticks; 0: not sampled
   Tick settle = 0;
-  // without chip select: like `pause`, for rests in which the data line changes; 0: unused
+  // without chip select: like `pause`, but for rests in which the data line changes; 0: unused
   Tick change_pause = 0;
 };
 
-/// Lengths of the rests of a clock, measured from its first changes.
+/// Lengths of the rests of a clock between words, measured in the first changes of the clock.
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
@@ -51,10 +51,10 @@ class ClockedDecoder {
 
   explicit ClockedDecoder(const ClockedFormat& format) : format_(format) {}
 
-  /// Clears the state, because the next part does not follow the previous one.
+  /// Clears the state. Call it if the next part does not follow the previous one.
   void restart() { *this = ClockedDecoder(format_); }
   void decode(const ClockedPart& part, std::vector<Burst>& bursts);
-  /// Works like `decode`, with `guessed` from `other`, which decoded the part after a restart.
+  /// Works like `decode`, but takes over bursts from `guessed`: `other` decoded them from this part after a restart.
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
   /// Ends the capture; a burst in progress is appended as cut.
   void finish(std::vector<Burst>& bursts);
@@ -66,7 +66,8 @@ class ClockedDecoder {
   struct Wire {
     bool level = false;
     std::span<const Tick> left{};  // changes of the wire that are not handled yet, in ticks
-    std::optional<Tick> border{};  // additional change at the border of two parts with different levels
+    // additional change of the wire at the border of two parts, if the levels there differ
+    std::optional<Tick> border{};
 
     void begin(const Changes* changes, Tick first, bool known);
     [[nodiscard]] Tick next() const;
@@ -75,7 +76,7 @@ class ClockedDecoder {
   };
   struct Targets {
     std::span<const Burst> bursts;
-    const Burst* open;  // burst that `other` has not completed yet; null: none
+    const Burst* open;  // burst that the other decoder has not completed yet; null: none
     std::size_t next = 0;
     bool met = false;
   };
@@ -103,7 +104,7 @@ class ClockedDecoder {
   bool seen_pause_ = false;
   bool open_ = false;
   bool lone_ = false;     // without chip select: the clock has changed at most once in the present burst
-  bool fell_ = false;     // since the last word a single clock change was followed by a rest low
+  bool fell_ = false;     // since the last word the clock has fallen once, and then rested at low level
   bool changed_ = false;  // the data line has changed during the present rest of the clock
   Burst burst_;
 };

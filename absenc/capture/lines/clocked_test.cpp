@@ -13,7 +13,7 @@ namespace {
 
 // A drawing of a clock with data lines and optional chip select, with 4 ticks per clock period.
 struct ClockedDrawing {
-  Wires wires{std::vector<Drawn>(4)};  // wires in the order clock, in, out, select
+  Wires wires{std::vector<Drawn>(4)};  // levels of the wires clock, in, out and select, in this order
 
   void hold(bool clock, bool in, bool out, bool select, std::size_t ticks) {
     const std::array levels{clock, in, out, select};
@@ -96,7 +96,7 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
     ClockedDrawing drawing;
     drawing.idle(20, idle_clock);
     drawing.spi(0x12, 0xF1);
-    drawing.hold(idle_clock, true, true, false, 60);  // a pause within the exchange
+    drawing.hold(idle_clock, true, true, false, 60);  // the clock pauses within the exchange, which does not end it
     drawing.spi(0x34, 0x0E);
     drawing.idle(10, idle_clock);
     drawing.hold(!idle_clock, true, true, true, 4);  // a clock for another chip, while chip select is inactive

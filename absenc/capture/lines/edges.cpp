@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "absenc/capture/lines/edges.cpp"
 #include <hwy/foreach_target.h>
-// Highway requires this include behind foreach_target.h.
+// The library Highway requires that this file is included after foreach_target.h.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -21,7 +21,7 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t word = 64;  // number of samples whose changes are collected as bits of one integer
-// samples searched for one channel after the other, so that they stay in a cache
+// number of samples that are searched for one channel after the other, so that they stay in a cache
 constexpr std::size_t piece = 64 * word;
 
 // Returns the levels of a channel in 64 samples: bit i is the level in sample i.
@@ -48,7 +48,8 @@ HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T chan
   return bits;
 }
 
-// Writes the positions of the set bits, and up to 7 meaningless values behind them.
+// Writes the positions of the bits set in `toggles`, and up to 7 meaningless values after them. Returns the end of the
+// positions.
 HWY_INLINE Tick* put(std::uint64_t toggles, Tick base, Tick* out) {
   const auto count = static_cast<std::size_t>(std::popcount(toggles));
   for (std::size_t i = 0; i < count; i += 8) {

@@ -22,10 +22,11 @@ namespace absenc::capture {
 /// Sets `changes[i].at` for `channels[i]`; `changes[i].before` must be the level before the block.
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
 
-/// Returns the level after the last change, or `changes.before` if there is none.
+/// Returns the level after the last of `changes`, or the level before them if there is none.
 [[nodiscard]] inline bool level_after(const Changes& changes) { return changes.before != (changes.at.size() % 2 != 0); }
 
-/// Appends the changes of `next`, a part that begins at `first`, where the level may change.
+/// Appends the changes of the next part of a capture, which begins at the tick `first`; its first level may differ from
+/// the last level of `changes`.
 void append(Changes& changes, const Changes& next, Tick first);
 
 }  // namespace absenc::capture

@@ -79,7 +79,7 @@ constexpr std::array decode_setups{DecodeSetup{1, Content::samples}, DecodeSetup
                                    DecodeSetup{5, Content::samples}};
 
 std::size_t any_block_size(Random& random, std::size_t ticks) {
-  // Smallest block in ticks: with smaller blocks a test case would take a second.
+  // With blocks smaller than this number of ticks a test case would take a second.
   const std::size_t least = ticks / 200 + 1;
   return least + below(random, below(random, 2) == 0 ? 8 : ticks);
 }
@@ -174,7 +174,7 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
       std::vector<std::uint8_t> bytes;
       for (const Character& c : decoded(reader, lines, threads, outcome)) bytes.push_back(c.value);
       RC_ASSERT(outcome.formats[0].idle_high == idle_high);
-      // The rounding error may be the same in all characters: up to a sample in 8 bits.
+      // All characters may have the same rounding error: up to a sample in 8 bits.
       RC_ASSERT(std::abs(outcome.formats[0].bit - bit) < 0.01 * bit + 1.0 / 8);
       RC_ASSERT(bytes == sent);
       if (first.formats.empty()) first = outcome;

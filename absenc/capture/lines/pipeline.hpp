@@ -16,7 +16,7 @@ namespace absenc::capture {
 
 /// Characters or bursts that were decoded since the previous part.
 struct DecodedPart {
-  Tick end = 0;  // time before which no later character or burst begins
+  Tick end = 0;  // no character or burst of a later part begins before this time
   std::span<const Character> characters;
   std::span<const Burst> bursts;
   std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first part on
@@ -47,7 +47,8 @@ struct PauseReading {
   Tick pause = 0;
   bool by_change = false;  // true: a shorter rest also ends a word if the data line changes during the rest
   std::vector<Burst> bursts{};
-  bool timed_out = false;  // the data line changed in every rest that ended a word: the end of a timeout or a monoflop
+  // true: the data line changed in every rest that ended a word, as at the end of an encoder's timeout (monoflop)
+  bool timed_out = false;
 };
 
 struct ClockedLine {
@@ -57,17 +58,19 @@ struct ClockedLine {
   std::optional<unsigned> select{};  // index of the channel with chip select, for SPI
   bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
   bool select_high = false;          // true: chip select is active high
-  Tick pause = 0;  // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
-  // `settle` and `change_pause` of ClockedFormat; `settle` is measured instead if `pause` is 0.
+  // without chip select: a rest of the clock longer than this, in ticks, ends a word; 0: `choose` decides
+  Tick pause = 0;
+  // As in ClockedFormat. If `pause` is 0, `settle` is measured instead.
   Tick settle = 0;
   Tick change_pause = 0;
-  /// Returns the index of the reading to use if `pause` is 0. Null: that with three clock periods.
+  /// Returns the index of the pause reading to use if `pause` is 0. Null: the reading whose limit is three clock
+  /// periods is used.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 
 struct ClockedOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
-  Tick pause = 0;       // without chip select: limit above which a rest of the clock ended a word, in ticks
+  Tick pause = 0;       // without chip select: a rest of the clock longer than this, in ticks, ended a word
 };
 
 ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const PartSink& sink);

@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_changes = 16384;  // number of changes of a line that suffice to detect its settings
-// Limit for the changes stored of one line while another line has too few.
+// Limit for the number of changes of one line that are stored while another line has too few.
 constexpr std::size_t most_changes = 64 * 16384;
 constexpr double fewest_ticks = 2.5;  // shortest bit time, in ticks
 
@@ -70,7 +70,8 @@ class AsyncDecoding {
   [[nodiscard]] AsyncDecoder::Statistics statistics(std::size_t line) const { return decoders_[line].statistics(); }
 
  private:
-  // Prepares for a part. If a gap is before it, the characters in progress end.
+  // Prepares the decoders for the next part. If there is a gap in the capture before it, the characters in progress
+  // end.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) finish_lines();
     begun_ = true;
@@ -101,7 +102,8 @@ class AsyncDecoding {
     characters.swap(bytes);
   }
 
-  // Delivers the characters that are settled; returns false if the sink ends the decoding.
+  // Delivers the characters that begin before `until` and the end of the last part. Returns false if the sink ends the
+  // decoding.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
@@ -169,7 +171,7 @@ class FirstChanges {
     return all || any;
   }
 
-  // Cuts the changes at a limit, so that found settings do not depend on the sizes of parts.
+  // Drops the changes after a fixed number, so that the detected settings do not depend on the sizes of the parts.
   void cut() {
     for (const Changes& line : changes_) {
       if (line.at.size() > most_changes) end_ = std::min(end_, line.at[most_changes]);

@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_clocks = 8194;  // number of clock changes that suffice to find the period
-// Limit for the changes of all wires but the clock that are stored while the clock has too few.
+// Limit for the number of data and chip select changes that are stored while the clock has too few changes.
 constexpr std::size_t most_data = 64 * 16384;
 
 // Indices of the wires of a clocked line among the channels that are read.
@@ -73,7 +73,7 @@ class ClockedDecoding {
   [[nodiscard]] bool selected() const { return selected_; }
 
  private:
-  // Prepares for a part. If a gap is before it, the burst in progress ends.
+  // Prepares the decoder for the next part. If there is a gap in the capture before it, the burst in progress ends.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) decoder_.finish(bursts_);
     const Changes& clock = levels.changes[0];
@@ -130,7 +130,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed, behind `settle`, in each of one or more rests.
+// Returns whether the data line changed in each rest between bursts, more than `settle` after the last clock change.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -175,10 +175,11 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
     word_formats.push_back(format);
     word_formats.back().pause = pause;
   }
-  // A timeout or a monoflop ends only between words.
+  // A change of the data line in a rest marks the end of a word: the encoder's timeout (monoflop) ends only between
+  // words.
   if (wires.in) {
     word_formats.push_back(word_formats.back());
-    // An encoder that does not drive the line changes nothing: there, only long rests end words.
+    // If no encoder drives the data line, it never changes: then only long rests end words.
     word_formats.back().pause =
         std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
     word_formats.back().change_pause = 2 * rests->half_period;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simple decoders, one sample after the other: the reference for the fast ones in tests.
+// Simple decoders that take one sample after the other: tests compare the fast decoders with them.
 #pragma once
 
 #include <algorithm>
@@ -114,7 +114,7 @@ class SlowDecoder {
 };
 
 struct SlowClocked {
-  const std::vector<Drawn>& levels;  // levels of the wires in the order clock, in, out, select
+  const std::vector<Drawn>& levels;  // levels of the wires clock, in, out and select, in this order
   ClockedFormat format;
   std::vector<Burst> found{};
   Burst burst{};
@@ -152,7 +152,7 @@ struct SlowClocked {
     add(burst.out, levels[2][i - 1] != 0);
     ++burst.bits;
   }
-  // Returns whether the data line changes between `settle` behind `last` and `until`.
+  // Returns whether the data line changes from `settle` ticks after `last` to the tick `until`.
   bool changes(Tick last, Tick until) const {
     for (Tick i = std::max<Tick>(last + format.settle, 1); i <= until && i < levels[1].size(); ++i) {
       if (levels[1][i] != levels[1][i - 1]) return true;

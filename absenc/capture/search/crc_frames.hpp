@@ -15,7 +15,7 @@
 
 namespace absenc::capture {
 
-/// Layout of a checksum in a frame; `padded`: it also covers a byte 00 that is not sent.
+/// Layout of a checksum in a frame; `padded`: the checksum is computed as if a byte 00 followed the covered part.
 struct Shape {
   unsigned width = 0;  // width of the checksum in bits
   bool refin = false;
@@ -54,7 +54,7 @@ class Frames {
 
 inline bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
 
-/// Returns the checksum in `frame` as a number; nothing if bits above its width are not 0.
+/// Returns the checksum in `frame` as a number; nothing if its field has bits above the width that are not 0.
 inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
   const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
   std::uint32_t value = 0;
@@ -69,7 +69,7 @@ inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Sh
   return value;
 }
 
-/// Calls `take` for each covered bit from `first` on; returns their number.
+/// Calls `take` for each bit that the checksum covers, from byte or bit `first` on; returns the number of these bits.
 template <class Take>
 std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::size_t first, const Take& take) {
   const std::size_t end = Frames::size(frame) - shape.trailing - shape.check_size;
@@ -88,7 +88,7 @@ inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned 
   return reflected ? reflect(value, width) : value;
 }
 
-/// Returns the frame, with `init` and `xorout`, as one polynomial.
+/// Returns the covered bits and the checksum of `frame`, changed by `init` and `xorout`, as one polynomial.
 inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
                            std::uint32_t init, std::uint32_t xorout) {
   Polynomial word;

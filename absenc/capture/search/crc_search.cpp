@@ -13,8 +13,9 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double settled_log2 = -20;  // log2 of one in a million: a solution below this chance is settled
-// Highest degree of a common divisor that is factorised; a higher one has too many factors.
+// log2 of one in a million: a solution with a smaller chance of being accidental is accepted as certain
+constexpr double settled_log2 = -20;
+// Highest degree of a common divisor that is factorised; a divisor of higher degree has too many factors.
 constexpr int most_common_degree = 63;
 constexpr unsigned widest = 16;
 
@@ -44,7 +45,7 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  // Possible positions of the first covered byte or bit, by polynomial and by init and xorout.
+  // Possible positions of the first covered byte or bit, for each polynomial and each pair of init and xorout.
   using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;
 
   void each_order(Shape shape) {
@@ -117,7 +118,7 @@ class CrcSearch {
     return word;
   }
 
-  // Reads the checksums of all frames; returns false if bits above the width are not 0.
+  // Reads the checksums of all frames; returns false if a checksum field has bits above the width that are not 0.
   bool take_checks(const Shape& shape) {
     checks_.clear();
     for (const auto& [length, frames] : frames_.lengths) {
@@ -148,7 +149,7 @@ class CrcSearch {
     return {{{0, 0}, {ones, 0}, {0, ones}, {ones, ones}}};
   }
 
-  // Returns possible polynomials without their highest power. `start`: init and xorout, if known.
+  // Returns possible polynomials without their highest power. `start`: init and xorout, if they are known.
   std::vector<std::uint32_t> polynomials(const Shape& shape, std::size_t first,
                                          std::optional<std::pair<std::uint32_t, std::uint32_t>> start) {
     Polynomial common;
@@ -179,7 +180,7 @@ class CrcSearch {
     return found;
   }
 
-  // Finds init and xorout for `poly`: all usual ones that fit, or else the first that fit.
+  // Finds init and xorout for `poly`: all usual pairs that fit the frames, or otherwise the first pair that fits.
   void fit(const Shape& shape, std::size_t first, std::uint32_t poly, Firsts& solutions) {
     bool is_usual = false;
     for (const auto& [init, xorout] : usual(shape)) {
@@ -197,7 +198,7 @@ class CrcSearch {
     }
   }
 
-  // Returns the xorout that explains the first frame of every length; nothing if none does.
+  // Returns the xorout with which the first frame of every length has the right checksum; nothing if there is none.
   std::optional<std::uint32_t> xorout_for(const Shape& shape, std::size_t first, std::uint32_t poly,
                                           std::uint32_t init) {
     std::optional<std::uint32_t> xorout;
@@ -210,7 +211,8 @@ class CrcSearch {
     return xorout;
   }
 
-  // Stores the solutions of `poly`: all usual ones, or else the one that covers most.
+  // Stores the solutions for `poly`: all with usual init and xorout, or otherwise the one whose checksum covers most of
+  // the frame.
   void keep(const Shape& shape, std::uint32_t poly, const std::map<Key, std::vector<std::size_t>>& keys) {
     const auto is_usual = [&](const Key& key) {
       const auto all = usual(shape);
@@ -227,7 +229,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution, whose chance `run` completes; `free_bits` of init and xorout fit by choice.
+  // Adds a solution; `run` later adds the rest of its chance. `free_bits`: number of bits of init and xorout that were
+  // chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {
@@ -240,7 +243,7 @@ class CrcSearch {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // Over bytes, this CRC is an exclusive or, which `sums` finds.
+    // Over bytes, this CRC equals the exclusive or of all bytes, which `sums` finds.
     if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }
@@ -252,7 +255,7 @@ class CrcSearch {
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
       const bool is_check = !never_changes(shape);
       for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
-        // Possible positions of the first covered byte, by the constant of the sum.
+        // Possible positions of the first covered byte, for each constant of the sum.
         std::map<std::uint8_t, std::vector<std::size_t>> firsts;
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
@@ -260,7 +263,7 @@ class CrcSearch {
               is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
-        // Other constants than 00 and FF count only if neither of these explains the frames.
+        // Constants other than 00 and FF count only if neither 00 nor FF explains the frames.
         const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
           const bool is_usual = constant == 0 || constant == 0xFF;
@@ -299,7 +302,7 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  // results of `known_checks`, by `trailing` and the position of the first covered byte or bit
+  // stored results of `known_checks`, by `trailing` and the position of the first covered byte or bit
   std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;

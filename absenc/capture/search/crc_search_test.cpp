@@ -43,7 +43,7 @@ std::vector<CheckedFrame> frames_of(const GeneratedCheck& made, std::size_t coun
   return frames;
 }
 
-// Returns whether a CRC equals an exclusive or, which the search reports as such.
+// Returns whether `crc` over bytes equals the exclusive or of all bytes; the search reports it as exclusive or.
 bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
 
 bool describes(const CheckSolution& solution, const GeneratedCheck& made) {
@@ -99,7 +99,8 @@ TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
 TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   std::mt19937 random(3);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .first = 1}, 6, random);
-  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;  // a first byte of zero does not change a CRC with init 0
+  // with an init of 0, a first byte of zero does not change the CRC
+  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());
   EXPECT_EQ(search.solutions.front().parameters, esl_8);
@@ -146,7 +147,7 @@ TEST(CrcSearch, FindsASum) {
   EXPECT_EQ(search.solutions.front().first.front(), 0u);
 }
 
-// Returns frames of a slow shaft, whose last byte is the exclusive or with `check_from`.
+// Returns frames with slow positions. Their last byte is the exclusive or of the bytes from index `check_from` on.
 std::vector<CheckedFrame> slow_positions(std::uint8_t check_from) {
   std::vector<CheckedFrame> frames;
   for (std::uint32_t i = 0; i < 8; ++i) {
@@ -238,7 +239,7 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares the list of divisors with a trial of every polynomial with the constant term 1.
+// Compares the list of divisors with the result of trying every polynomial that has the constant term 1.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;
@@ -254,7 +255,7 @@ RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
 }
 
 TEST(Polynomial, DividesAcrossWords) {
-  Polynomial product;  // the product (x^200 + x^7 + 1)(x^8 + x^2 + 1)
+  Polynomial product;  // the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
   for (int i = 208; i >= 0; --i)
     product.append(i == 208 || i == 202 || i == 200 || i == 15 || i == 9 || i == 8 || i == 2 || i == 0 || i == 7);
   Polynomial rest = product;

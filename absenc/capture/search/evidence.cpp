@@ -12,11 +12,12 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
-// accepted replies after which no more are tried: the rate is then known to some percent
+// number of random replies that are tried if only one or two frames were captured
+constexpr unsigned many_attempts = 1u << 20;
+// after this number of accepted replies no more are tried: the rate is then known to some percent
 constexpr unsigned enough_accepted = 256;
 
-/// Stores the position that a good reply reports.
+/// A sink that stores the position that a good reply reports.
 struct PositionSink final : FieldSink {
   void put(const FieldValue&) override {}
   void put_reading(const Reading& reading) override {
@@ -44,7 +45,7 @@ double relative_distance(const Reading& from, const Reading& to) {
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Returns log10 of the chance that random positions move so little; nothing without motion.
+// Returns log10 of the chance that random positions move as little as these; nothing if the position never changes.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
@@ -107,7 +108,7 @@ class Distinct {
 double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
 
 double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good, unsigned attempts) {
-  // Seeded by the length of the reply, so that the same exchange gives the same result each time.
+  // The seed is the length of the reply, so that the same exchange gives the same result each time.
   std::mt19937_64 random(good.reply.bytes.size());
   ObservedExchange noise = good;
   const std::size_t repeated_size = repeated(good);
@@ -159,7 +160,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // sum of the terms, as multiples of the first term
+  double sum = 0;  // sum of the terms so far, in multiples of the first term
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

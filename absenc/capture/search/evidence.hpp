@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weighs exchanges as evidence for a protocol.
+// Estimates how strongly exchanges are evidence for a protocol.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace absenc::capture {
 /// A frame that owns its bytes.
 struct ObservedFrame {
   std::vector<std::uint8_t> bytes{};
-  std::size_t bits = 0;  // number of bits, on clocked links; otherwise 0
+  std::size_t bits = 0;  // number of bits of the frame on clocked links; otherwise 0
   std::optional<CanFrame> can{};
 
   /// Returns a view of this frame, which is valid as long as this object exists.
@@ -31,22 +31,23 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// The evidence that exchanges give for a protocol.
+/// The evidence for a protocol that captured exchanges give.
 struct Evidence {
-  std::size_t tried = 0;      // number of exchanges examined
+  std::size_t tried = 0;      // number of exchanges that were examined
   std::size_t explained = 0;  // number of exchanges with a good reply
   std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
-  /// log10 of the probability that the unit would accept as many random frames.
+  /// log10 of the probability that the unit would accept as many random frames as good.
   double frames = 0;
-  /// log10 of the chance that random positions move as little; empty: no position changed
+  /// log10 of the chance that random positions move as little as these; empty: no position changed
   std::optional<double> motion{};
 
-  /// Returns log10 of the chance of frames and motion; the motion counts only if all is explained.
+  /// Returns log10 of the chance that all is an accident, by the frames and the motion; the motion counts only if every
+  /// exchange is explained.
   [[nodiscard]] double chance() const;
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
 
-/// log10 of the chance up to which frames suffice as evidence for options, without the motion.
+/// Limit of log10 of the chance: at or below it the frames alone, without the motion, are enough evidence for options.
 inline constexpr double frames_suffice = -2;
 
 /// Usual limit for the number of random replies tried for a frame.

@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::int64_t most_bits = 64;
-// Number of exchanges tried first: options that explain none of these are given up.
+// Number of exchanges that are tried first: options that explain none of them are given up.
 constexpr std::size_t telling = 32;
 
 struct NoEvidence final : EvidenceSink {
@@ -24,13 +24,13 @@ bool same_resolution(const Resolution& one, const Resolution& other) {
 
 bool is_number_of_bits(const Option& option) { return option.choices.empty() && option.maximum <= most_bits; }
 
-/// Returns whether the options of one of the hypotheses equal `options`.
+/// Returns whether one of the hypotheses has the option values of `options`.
 bool contains(std::span<const Hypothesis> all, const Options& options) {
   return std::any_of(all.begin(), all.end(),
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
 }
 
-/// A hash of the decoded content of frames, to compare what options decode.
+/// A hash of the decoded content of frames, by which hypotheses that decode the same are recognised.
 class Meaning final : public FieldSink {
  public:
   void put(const FieldValue& value) override {
@@ -84,7 +84,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds variants of `base`: other numbers of bits, and other values of one option with choices.
+  /// Adds variants of `base`: with other numbers of bits, and with another value of one option that has a list of
+  /// choices.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -100,7 +101,7 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds variants of `base` with another value of one option with choices.
+  /// Adds variants of `base` in which one option that has a list of choices has another value.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());
@@ -141,7 +142,7 @@ class HypothesisSearch {
     return count;
   }
 
-  // Adds `base` with the fewest bits that explain the most exchanges: frames cannot show more.
+  // Adds the variant of `base` with the fewest bits that explains the most exchanges: frames cannot show more bits.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;

@@ -10,20 +10,20 @@
 
 namespace absenc::capture {
 
-/// Options that explain exchanges, with their evidence.
+/// Option values that explain exchanges, with the evidence for them.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};
-  std::size_t tried = 1;  // number of attempts, including this one, each of which may match by chance
-  bool at_least = false;  // the position may have more bits than `options` state
+  std::size_t tried = 1;  // number of hypotheses that were tried, including this one: each may match by chance
+  bool at_least = false;  // true: the encoder may have more bits than `options` state
 
-  /// Returns log10 of the probability that one of `tried` hypotheses is as good by chance.
+  /// Returns log10 of the probability that at least one of `tried` hypotheses fits this well by chance.
   [[nodiscard]] double chance() const;
-  /// Returns whether the evidence of the frames suffices without that of the motion.
+  /// Returns whether the evidence of the frames alone is enough, without that of the motion.
   [[nodiscard]] bool is_proven() const;
 };
 
-/// Limit of `Hypothesis::chance`: a result at or below it is found, one above only possible.
+/// Limit of `Hypothesis::chance`: a hypothesis at or below it counts as found, one above it only as possible.
 inline constexpr double is_found = -3;
 
 /// Returns whether `one` is ranked before `other`: proven hypotheses first, then by chance.

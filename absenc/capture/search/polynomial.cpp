@@ -7,10 +7,10 @@ namespace {
 
 constexpr unsigned highest_degree = 16;
 
-// Returns the degree plus 1; std::bit_width returns different types in different libraries.
+// Returns the degree of `value` plus 1. The return type of std::bit_width differs between libraries.
 unsigned width_of(std::uint64_t value) { return static_cast<unsigned>(std::bit_width(value)); }
 
-/// Returns the irreducible polynomials of degree 1 to 16 in rising order, without x.
+/// Returns the irreducible polynomials of degree 1 to 16 in rising order; the polynomial x is left out.
 const std::vector<std::uint32_t>& irreducible_polynomials() {
   static const std::vector<std::uint32_t> all = [] {
     constexpr std::uint32_t limit = 1u << (highest_degree + 1);
@@ -66,7 +66,7 @@ std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degr
   };
   for (const std::uint32_t factor : irreducible_polynomials()) {
     if (width_of(factor) > degree + 1) break;
-    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the polynomial that remains is irreducible
+    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // what is left of `value` is irreducible
     unsigned power = 0;
     for (std::uint64_t rest = value, quotient = divide(rest, factor); rest == 0; quotient = divide(rest, factor)) {
       ++power;

@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;  // number of good frames below which a stream is no evidence
+constexpr std::size_t least_frames = 3;  // a stream with fewer good frames than this is no evidence
 
 // Returns the size of the good reply that begins with the first of `bytes`, or 0 if none does.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
@@ -38,7 +38,7 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
-// Returns whether each option in `of_bits` is itself a number of bits of the resolution.
+// Returns whether each option in `of_bits` directly states a number of bits of the resolution.
 bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
   return std::all_of(of_bits.begin(), of_bits.end(), [&](std::size_t option) {
@@ -67,13 +67,13 @@ std::vector<Options> stream_options(const Unit& unit) {
   return all;
 }
 
-// Returns a key, smaller is better: the fewest single-turn bits, then the most multi-turn bits.
+// Returns a key for sorting, smaller is better: the fewest single-turn bits, then the most multi-turn bits.
 std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis) {
   const Resolution resolution = unit.resolution(hypothesis.options);
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
-// Makes `options` say that the encoder sends unsolicited frames, if the unit has such options.
+// Sets `options` so that the encoder sends unsolicited frames, if the unit has options for this.
 void set_streaming(const Unit& unit, Options& options, double frames_per_second) {
   if (unit.streams == nullptr || unit.streams(options)) return;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
@@ -95,7 +95,7 @@ std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& opti
   std::vector<ObservedExchange> replies;
   std::size_t longest = 0;        // size of the longest good reply in the stream, in bytes
   std::size_t begin_of_good = 0;  // index in `replies` of the first good reply
-  std::size_t end_of_good = 0;    // index in `replies` behind the last good reply
+  std::size_t end_of_good = 0;    // index in `replies` after the last good reply
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
@@ -121,12 +121,13 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
-    // The first frame was searched at every byte of a frame's length: each byte is an attempt.
+    // The first frame was searched at every byte of a frame's length, so each of these bytes counts as an attempt.
     for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));
   }
-  // The fewest bytes outside of frames come first, then models, then the smallest `bits_of`.
+  // Sorts the hypotheses: those with the fewest bytes outside of frames come first, then models, then the smallest key
+  // of `bits_of`.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {
     const std::size_t noise = one.evidence.tried - one.evidence.explained;
     const std::size_t other_noise = other.evidence.tried - other.evidence.explained;

@@ -51,7 +51,7 @@ double unit_um(const MonitoredEncoder& shown) {
   return uri.unit->resolution(uri.options).unit_um;
 }
 
-// Returns `value` as text, in at most `width` characters where possible.
+// Returns `value` as text. Drops decimals if the text is longer than `width` characters.
 std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
   std::string text = fmt::format("{:.{}f}", value, decimals);
@@ -80,7 +80,7 @@ std::string speed_text(const Snapshot& snapshot) {
   return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
 }
 
-// Returns speed and unit as "12.0 +/- 0.3 rpm", or as "- rpm" without a speed.
+// Returns speed and unit as "12.0 +/- 0.3 rpm", or as "- rpm" if no speed is known.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -88,7 +88,7 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
   return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
-// Returns whether an alarm is raised, or a status flag that may stand for one.
+// Returns whether an alarm is raised, or a status flag is set that may stand for an alarm.
 bool has_alarm(const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
@@ -146,7 +146,8 @@ std::array<std::string_view, 2> units_of(const View& view) {
   return {"mm", "mm/s"};
 }
 
-// Draws encoders from `row` on, at least the selected one. Returns the row after the list.
+// Draws the list of encoders from the screen row `row` on; at least the selected encoder is drawn. Returns the row
+// after the list.
 int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
@@ -194,7 +195,7 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    // The flags of an encoder with two channels do not fit into this line: they are among the fields.
+    // The flags of an encoder with two channels are too long for this line; they are shown among the fields.
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
@@ -228,7 +229,7 @@ std::string speed_line(const Snapshot& snapshot) {
 }
 
 std::string statistics_line(const Snapshot& snapshot) {
-  // Only an encoder that sends without requests has readings without latencies.
+  // Readings without latencies can only come from an encoder that transmits without requests.
   if (snapshot.longest == Time{} && snapshot.readings != 0) {
     return fmt::format("{:.1f} a second, sent without requests", snapshot.rate);
   }
@@ -271,7 +272,7 @@ int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;
   const int room = screen.columns() - 2 + between;
-  int width = 1;  // width of a column, from the longest field that is at most half as wide as the screen
+  int width = 1;  // width of a column, set by the longest field that is at most half as wide as the screen
   for (const std::string& field : snapshot.fields) {
     const int needed = static_cast<int>(field.size()) + between;
     if (needed <= room / 2) width = std::max(width, needed);
@@ -299,7 +300,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// Draws the encoder's last bad exchanges, also those that were repeated.
+// Draws the last exchanges of the encoder that failed, also those whose request was then repeated with success.
 void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
@@ -352,7 +353,7 @@ void draw_help(Screen& screen, int row, int end) {
       Style::plain);
 }
 
-// Returns the question to the user, followed by the selected encoder's short name.
+// Returns the question that the screen asks, followed by the short name of the selected encoder.
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);

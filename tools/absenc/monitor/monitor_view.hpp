@@ -31,7 +31,7 @@ inline constexpr int least_columns = 64;
 /// Draws the whole screen of `view`, or a message that the screen is too small.
 void draw(Screen& screen, const View& view);
 
-/// Returns one line "elbow: 123.456 deg ..."; it has no value of a reading that is not live.
+/// Returns the encoder's state as one line "elbow: 123.456 deg ..."; without values if the reading is not live.
 [[nodiscard]] std::string to_line(const MonitoredEncoder& shown);
 [[nodiscard]] Json to_json(const MonitoredEncoder& shown);
 

@@ -22,7 +22,7 @@ namespace {
 
 struct TextAttributes {
   attr_t attributes;
-  short colour;  // colour of the text, and number of the colour pair; 0: the default colour
+  short colour;  // colour of the text, which is also the number of the colour pair; 0: the default colour
 };
 
 // Attributes of text, indexed by Style. Terminals without colours show only the attributes.
@@ -83,7 +83,7 @@ KeyPress key_of(int key) {
 }
 
 bool wants_colours() {
-  // A set and not empty NO_COLOR asks for no colours: https://no-color.org.
+  // If the environment variable NO_COLOR is set and not empty, no colours are used: https://no-color.org.
   const char* const no_color = std::getenv("NO_COLOR");
   return no_color == nullptr || *no_color == '\0';
 }
@@ -96,7 +96,7 @@ std::unique_ptr<Screen> Screen::open() {
   ::set_escdelay(25);
   terminal->screen = ::newterm(nullptr, stdout, stdin);
   if (terminal->screen == nullptr) return nullptr;
-  if (::tigetstr("cup") == nullptr) {  // the terminal cannot move the cursor, as with TERM=dumb
+  if (::tigetstr("cup") == nullptr) {  // the terminal, for example with TERM=dumb, cannot move the cursor
     ::endwin();
     ::delscreen(terminal->screen);
     return nullptr;

@@ -29,7 +29,7 @@ enum class KeyPress : std::uint8_t {
 
 class Screen {
  public:
-  /// Takes over the terminal. Returns null if it cannot be used as a screen.
+  /// Takes over the terminal. Returns null if the terminal cannot be used as a screen.
   [[nodiscard]] static std::unique_ptr<Screen> open();
   /// Restores the terminal to its state before `open`.
   ~Screen();
@@ -46,7 +46,7 @@ class Screen {
   void fill(int row, std::string_view text, Style style);
   void show();
 
-  /// Waits at most `limit` for the next key; returns KeyPress::none without one.
+  /// Waits at most `limit` for the next key. Returns KeyPress::none if no key was pressed.
   [[nodiscard]] KeyPress key(Time limit);
 
  private:

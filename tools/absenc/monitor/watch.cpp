@@ -26,25 +26,26 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_lines = 200;
 constexpr Time between_summaries = 100ms;
-// Shortest time between two traced good readings with the same alarms.
+// Shortest time between two good readings that are listed in the trace, unless the alarms change.
 constexpr Time between_lines = 200ms;
 
-// Converts a time of os::now for functions of the standard library.
+// Converts a time of os::now to the type that functions of the standard library take.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
-/// Collects fields of the last reply that the line of the reading leaves out.
+/// Collects the fields of the last reply that are not in the line of text about the reading.
 class OtherFields final : public FieldSink {
  public:
   explicit OtherFields(const Unit& unit) : unit_(&unit) {}
 
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
-    // The flags of an encoder with two channels do not fit into the line of the reading.
+    // The flags of an encoder with two channels are too long for the line about the reading, so they are listed as
+    // fields.
     const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
     const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
-    const bool is_exchange = info.role == Role::exchange;  // the field repeats a part of the request
+    const bool is_exchange = info.role == Role::exchange;  // the field only repeats a part of the request
     if (is_in_line || is_exchange || info.role == Role::position || info.role == Role::turns) return;
     const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
     fields_.emplace_back(info, shown);
@@ -145,8 +146,8 @@ void Watch::work(const std::stop_token& stop) {
         next = pace.next();
       }
     }
-  } catch (const os::Interrupted&) {  // os::interrupted() is set, which ends every thread
-  } catch (const os::Ended&) {        // the thread was asked to end while a line without pauses kept it waiting
+  } catch (const os::Interrupted&) {  // a signal has set os::interrupted(), which ends every thread
+  } catch (const os::Ended&) {        // the thread was asked to end while it waited on a line without pauses
   } catch (const std::exception& error) {
     end(error.what());
   }
@@ -249,7 +250,7 @@ std::string Watch::result_of(Encoder& live, const Command& command) {
       return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
     return fmt::format("{}: {}", command.name, outcome.change.text());
-  } catch (const os::Failure& failure) {  // the next reading reports that the port was lost
+  } catch (const os::Failure& failure) {  // the port was lost, which the next reading reports
     return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
 }

@@ -30,9 +30,9 @@ struct Snapshot {
   };
 
   State state = State::opening;
-  Time age{};  // age of the last reading; without a reading, time since the watch started
+  Time age{};  // age of the last reading; before the first reading, time since the watch started
   bool has_reading = false;
-  Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
+  Sample last{};  // last reading; valid if `has_reading` is true; it is the present position only in the state `live`
   std::string message{};  // reason of the states failing, lost and ended; in opening "" before the first attempt failed
   std::string notice{};   // message to the user, such as the result of the last command
   host::Counters counters{};
@@ -43,10 +43,10 @@ struct Snapshot {
   Time median{};               // median of the latencies from request to reply
   Time percentile_99{};
   Time longest{};
-  // Lines of text about the last readings and events, the newest last; only with details.
+  // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
   std::vector<std::string> trace{};
   std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
-  // "name value" of the fields that the line of the reading lacks; only with details.
+  // Texts "name value" of the fields that are not in the line about the reading; empty unless details were asked for.
   std::vector<std::string> fields{};
 };
 
@@ -55,7 +55,8 @@ struct Snapshot {
 /// Watches one encoder in a thread of its own, because its port blocks.
 class Watch {
  public:
-  /// The first reading is `offset` after the start; `rate`: readings per second, 0: as fast as possible.
+  /// Begins to watch an encoder. The first reading is `offset` after the start; `rate`: readings per second, 0: as fast
+  /// as possible.
   Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
@@ -89,23 +90,23 @@ class Watch {
   Time offset_;
   Time start_;
 
-  mutable std::mutex mutex_;  // guards the members `changed_` to `command_`
+  mutable std::mutex mutex_;  // guards the members from `changed_` to `command_`
   std::condition_variable_any changed_;
   Snapshot known_;
-  Time known_at_{};  // time of the last reading; before the first one, time of the start
+  Time known_at_{};  // time of the last reading; before the first reading, time of the start
   std::deque<std::string> lines_;
   bool paused_ = false;
   std::optional<Command> command_;
 
-  // The members `next_summary_` to `command_runs_` are used by the thread only.
+  // The members from `next_summary_` to `command_runs_` are used only by the thread that reads.
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // whether the position started again at the previous reading
-  bool command_runs_ = false;  // whether a command is running, which must not be aborted
+  bool restarted_ = false;     // the continuous position started again at the previous reading
+  bool command_runs_ = false;  // a command is running, which must not be aborted
 
-  std::jthread thread_;  // last member, because the thread uses all other members
+  std::jthread thread_;  // must be the last member, because the thread uses all other members
 };
 
 }  // namespace absenc::tool

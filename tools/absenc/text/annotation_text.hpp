@@ -16,10 +16,10 @@ namespace absenc::tool {
 using namespace client;
 
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
-// Whether text and JSON show the bits of each field of a frame.
+// Selects whether text and JSON show which bits of a frame each field occupies.
 enum class ShowBits : std::uint8_t { no, yes };
 
-// Whether a line of text with an error or a raised alarm has a ! after its time.
+// Selects whether a line of text is marked with ! after its time if it has an error or a raised alarm.
 enum class MarkAlarms : std::uint8_t { no, yes };
 
 /// Returns whether the annotation has a reading with a raised alarm.
@@ -46,7 +46,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   AnnotationFormat format_;
   ShowBits bits_;
   MarkAlarms marks_;
-  // The members `time_format_` to `row_` are used only for CSV.
+  // The members from `time_format_` to `row_` are used only for CSV.
   std::string time_format_;
   ReadingColumns reading_;
   std::vector<Column> columns_;

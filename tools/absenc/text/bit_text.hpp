@@ -16,7 +16,7 @@ namespace absenc::tool {
 /// Returns bit ranges as text, the most significant range first: "16-32", "7", "24-31 16-23".
 [[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
-/// The bits of each field of a good reply; fields without declared bits are missing.
+/// The bits that each field of a good reply occupies; fields that declare no bits are left out.
 class FieldPlaces {
  public:
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
@@ -26,7 +26,8 @@ class FieldPlaces {
   [[nodiscard]] std::string text() const;
   /// Returns {"singleturn":[{"first":16,"count":17}]}, the least significant range first.
   [[nodiscard]] Json json() const;
-  /// Inserts the bits of the field that the first column of `rows` names as third column.
+  /// Inserts the bits of a field as the third column of its row. The first column of each row must be the name of the
+  /// field.
   void add_to(std::vector<std::vector<std::string>>& rows) const;
 
  private:

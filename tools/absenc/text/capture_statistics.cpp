@@ -71,7 +71,7 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   error_run_.count = 0;
-  // A composed frame repeats a position that was added before.
+  // A frame that is composed of several exchanges repeats a position that was already added.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
 }

@@ -52,7 +52,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] std::uint64_t errors() const { return errors_; }
-  /// Returns the number of annotations that are neither bad nor cut.
+  /// Returns the number of annotations that have no error and are not cut off by the begin or end of the capture.
   [[nodiscard]] std::uint64_t good() const { return count_ - errors_ - cut_; }
 
   [[nodiscard]] std::string text(const CaptureOutcome& outcome) const;
@@ -93,8 +93,8 @@ class CaptureStatistics final : public capture::AnnotationSink {
   std::uint64_t count_ = 0;
   std::uint64_t errors_ = 0;
   std::uint64_t cut_ = 0;
-  std::uint64_t composed_ = 0;            // number of frames whose bytes several exchanges carried
-  std::array<std::uint64_t, 4> kinds_{};  // number of annotations of each kind, without composed frames
+  std::uint64_t composed_ = 0;            // number of frames whose bytes were spread over several exchanges
+  std::array<std::uint64_t, 4> kinds_{};  // number of annotations of each kind, without the composed frames
   std::array<std::uint64_t, error_kinds> by_error_{};
   std::uint64_t echoes_ = 0;
   std::uint64_t repeated_ = 0;

@@ -12,33 +12,35 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Opens the encoder's port and prints notes about it. Throws as Connection::open does.
+/// Opens the encoder's port and prints notes about the port. Throws the same exceptions as Connection::open.
 [[nodiscard]] std::unique_ptr<Connection> open_connection(const EncoderAddress& uri);
-/// Opens an encoder and prints notes about its port. `period`: intended time between readings, 0: none.
+/// Opens an encoder and prints notes about its port. `period`: intended time between readings; 0: no intended time.
 [[nodiscard]] Encoder open_encoder(const EncoderAddress& uri, Time period = {});
 
-/// Returns a trouble as {"ok":false,"error":...}.
+/// Returns a failure as the JSON object {"ok":false,"error":...}.
 [[nodiscard]] Json to_json(const Trouble& trouble);
 
-/// Sets keys about the state of the change; none for a command that changes no encoder.
+/// Sets the keys that state whether the encoder was changed; sets none for a command that changes no encoder.
 void set_change(Json& json, const Change& change);
 
-/// Returns "Looks like only_echo: ...; `absenc doctor tformat:/dev/ttyUSB0` says more".
+/// Returns the finding about a failure as text: "Looks like only_echo: ...; `absenc doctor tformat:/dev/ttyUSB0` says
+/// more".
 [[nodiscard]] std::string finding_line(const Trouble& trouble, const EncoderAddress& address);
 
 /// Returns the counters of exchanges as "1234 good, 2 failed (2 bad_checksum), 2 repeated".
 [[nodiscard]] std::string summary(const host::Counters& counters);
-/// Returns `summary`, and the reason if there are more good exchanges than readings.
+/// Returns the text of `summary`. If there are more good exchanges than readings, adds the reason.
 [[nodiscard]] std::string exchanges_text(const host::Counters& counters, std::uint64_t readings);
 
-/// Returns the number of each error that occurred, as {"timeout":2}.
+/// Returns how often each error occurred, as a JSON object like {"timeout":2}.
 [[nodiscard]] Json errors_to_json(const host::Counters& counters);
 
-/// Sets position and speed, in rpm or mm/s, with its uncertainty; invalid values are null.
+/// Sets the keys for position and speed (in rpm or mm/s) with the speed's uncertainty; invalid values are null.
 void set_motion(Json& json, const Sample& sample, double unit_um);
-/// Sets the joint's speed and its uncertainty, null if unknown; nothing without joint settings.
+/// Sets the keys for the joint's speed and its uncertainty, null if unknown. Sets nothing if the address has no joint
+/// settings.
 void set_joint_speed(Json& json, const Sample& sample, const Joint& joint, double unit_um);
-/// Returns the angles for which the address has settings, as "   joint 12.3450 deg".
+/// Returns the angles that follow from settings in the address, as "   joint 12.3450 deg".
 [[nodiscard]] std::string angles_text(const Joint& joint, const Sample& sample);
 
 }  // namespace absenc::tool

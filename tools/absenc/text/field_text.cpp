@@ -34,7 +34,7 @@ void JsonFields::put_reading(const Reading& reading) {
 
 namespace {
 
-// Returns the flag's meaning and the user's action, if any (action_of).
+// Returns the meaning of a flag and, if there is one, the action that it requires of the user (action_of).
 std::string in_words(const FlagInfo& flag, bool beside_alarms) {
   const std::string_view action = action_of(flag, beside_alarms);
   return action.empty() ? std::string(flag.meaning) : fmt::format("{}: {}", flag.meaning, action);
@@ -51,7 +51,7 @@ void FieldTable::put(const FieldValue& value) {
   if (info.kind == FieldInfo::Kind::flags) put_flags(info, static_cast<std::uint64_t>(value.number));
 }
 
-// Makes a row for each set flag. If alarms have rows, no row advises to read the alarms.
+// Makes a row for each set flag. If alarms have rows of their own, no row advises the user to read the alarms.
 void FieldTable::put_flags(const FieldInfo& field, std::uint64_t bits) {
   const auto sums_up = [](const FlagInfo& flag) { return flag.action == read_the_alarms; };
   if (bits != 0 && std::none_of(field.flags.begin(), field.flags.end(), sums_up)) {
@@ -83,7 +83,7 @@ void FieldTable::put_reading(const Reading& reading) {
   std::erase_if(judged_, [&](const ValidatedRow& judged) {
     if (holds(*judged.info, reading)) return false;
     rows[judged.row][1] = marked(*judged.info, rows[judged.row][1], reading);
-    return true;  // a marked row leaves the list, so that a later reading does not mark it again
+    return true;  // true removes the row from the list, so that a later reading does not mark it again
   });
 }
 

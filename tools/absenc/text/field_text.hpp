@@ -15,10 +15,10 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns the options of a unit as {"singleturn_bits":17,...}.
+/// Returns the options of a unit as a JSON object like {"singleturn_bits":17,...}.
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
-/// Puts decoded fields into a JSON object; doubtful ones get a key such as `singleturn_valid`.
+/// Puts decoded fields into a JSON object. A field that may be invalid gets a further key such as `singleturn_valid`.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -32,10 +32,11 @@ struct JsonFields final : FieldSink {
   std::vector<ValidatedField> judged_;
 };
 
-/// Returns rows for `table`: name, value with unit, and meaning; one more for each set flag.
+/// Returns the rows of `table`: name, value with unit, and meaning of each field, and one more row for each set flag.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
-/// Makes rows of decoded fields: name, value with unit, and meaning; one more for each set flag.
+/// Makes rows of a table from decoded fields: name, value with unit, and meaning of each field; one more row for each
+/// set flag.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -49,7 +50,7 @@ struct FieldTable final : FieldSink {
   void put_flags(const FieldInfo& field, std::uint64_t bits);
 
   std::vector<ValidatedRow> judged_;
-  // row number and flag, for flags whose advice is to read the alarms
+  // number of the row, and the flag, for each flag whose advice is to read the alarms
   std::vector<std::pair<std::size_t, const FlagInfo*>> sends_to_alarms_;
   bool shows_alarms_ = false;
 };

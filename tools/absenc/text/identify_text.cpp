@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t most_shown = 8;
 
-// Returns the probability 10^`log10` as "1 in 16384", "1 in 10^9" or "as likely".
+// Returns the probability 10^`log10` as text: "1 in 16384", "1 in 10^9", or "as likely" if it is nearly 1.
 std::string chance_text(double log10) {
   if (log10 > -0.05) return "as likely";
   if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
@@ -75,7 +75,7 @@ bool same_encoder(const Candidate& one, const Candidate& other) {
   return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
 }
 
-// Returns the likeliest found candidate, and found ones of its protocol with other addresses.
+// Returns the likeliest candidate that counts as found, and the others of the same protocol that have other addresses.
 std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates) {
@@ -86,7 +86,7 @@ std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   return all;
 }
 
-// Returns a note for each found encoder whose frames several candidates explain equally well.
+// Returns a note for each encoder that was found, if several candidates explain its frames equally well.
 std::vector<std::string> ties(std::span<const Candidate> candidates, std::span<const Candidate* const> found) {
   std::vector<std::string> notes;
   for (const Candidate* best : found) {

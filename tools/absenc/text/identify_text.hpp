@@ -14,7 +14,7 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns the reason why a search found nothing, judged by the received bytes, and what to try.
+/// Returns the reason why a search found nothing, concluded from the received bytes, and what the user can try.
 [[nodiscard]] std::string advice_for(const LineFindings& findings, const LineSearch& search);
 
 /// Returns the command that reads a candidate: absenc read "tformat:/dev/ttyUSB0?model=23-bit".
@@ -22,7 +22,7 @@ using namespace client;
 /// Returns the command that decodes a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// Prints candidates of a search. Returns exit_good only if chance cannot explain the first.
+/// Prints the candidates of a search. Returns exit_good only if the first candidate cannot be explained by chance.
 int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
                     bool json);
 

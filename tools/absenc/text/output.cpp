@@ -20,7 +20,7 @@ void print_line(std::string_view text) {
   throw Failure(fmt::format("standard output cannot be written: {}", std::strerror(error)));
 }
 
-// No fmt::print, which throws: a closed standard error must not change the exit status.
+// Does not use fmt::print, which throws if standard error is closed: that must not change the exit status.
 void print_note(std::string_view text) { print_prompt(fmt::format("{}\n", text)); }
 
 void print_message(std::string_view text) { print_prompt(fmt::format("absenc: {}\n", text)); }

@@ -17,7 +17,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   [[nodiscard]] bool visible() const { return visible_; }
-  /// Replaces the shown text by `text`. Nothing else may be printed until `clear`.
+  /// Replaces the shown text by `text`. Until `clear` is called, nothing else may be printed.
   void show(std::string_view text) {
     if (!visible_) return;
     print_prompt("\r\033[K");

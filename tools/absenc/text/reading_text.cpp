@@ -20,12 +20,12 @@ using namespace client;
 
 namespace {
 
-// Returns the decimals of degrees with which neighbouring counts of `bits` bits differ.
+// Returns how many decimals of degrees are needed to tell neighbouring counts of `bits` bits apart.
 int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
-// Returns the decimals of millimetres for a count of `unit_um` micrometres, at most 9.
+// Returns how many decimals of millimetres, at most 9, a count of `unit_um` micrometres needs.
 int linear_decimals(double unit_um) {
   int decimals = 9;
   for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
@@ -78,7 +78,8 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// Returns whether a ready encoder with two channels reports all flags, and no set one requires an action.
+// For an encoder with two channels, returns whether it is ready, reports all flags, and has no flag set that requires
+// an action.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

@@ -18,10 +18,10 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Reason why the validity of a position is unknown.
+/// Reasons why it is not known whether a position is valid.
 enum class Doubt : std::uint8_t {
   none,
-  // No second reading confirmed the position.
+  // No second reading has confirmed the position.
   unconfirmed,
 };
 [[nodiscard]] inline Doubt doubt_of(const Sample& sample) { return sample.doubtful ? Doubt::unconfirmed : Doubt::none; }
@@ -40,7 +40,7 @@ enum class Doubt : std::uint8_t {
 /// Returns the raised alarms in words.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets the keys of validity and of alarms; null means unknown.
+/// Sets the JSON keys that state validity and alarms; null means that the encoder does not report it.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
 /// Returns millimetres as text "0.125", with the decimals (at most 9) that one count of `unit_um` micrometres needs.

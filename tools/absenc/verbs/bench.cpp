@@ -23,8 +23,8 @@ namespace {
 
 struct Measurement {
   std::vector<Time> latencies;  // latencies of all good readings, the shortest first
-  // Deviations of the times between the beginnings of two readings from the period, the least first; without a rate
-  // none.
+  // The time between the beginnings of two readings, minus the period, for each two readings; the smallest first. Empty
+  // without a rate.
   std::vector<Time> deviations;
   Time period{};
   std::uint64_t failed = 0;
@@ -33,14 +33,14 @@ struct Measurement {
   std::uint64_t items = 0;
 };
 
-// With `rate` 0, one reading follows the other.
+// Measures for `seconds`. With `rate` 0, each reading begins directly after the previous one.
 Measurement measure(Connection& encoder, double seconds, double rate) {
   Measurement measurement;
-  // Allocations during the measurement would disturb the cycle.
+  // Memory is reserved before, because allocations during the measurement would disturb the cycle.
   const auto expected = static_cast<std::size_t>(std::min(rate * seconds, 1e7));
   measurement.latencies.reserve(expected);
   measurement.deviations.reserve(expected);
-  encoder.read();  // not measured: the first readings confirm the position and detect echo
+  encoder.read();  // this reading is not measured, because the first readings confirm the position and detect echo
   const Time start = os::now();
   const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
   const Time processor_before = os::processor_time();
@@ -89,7 +89,7 @@ struct Percentile {
 };
 constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
 
-// Returns the fraction of the time in which characters were on the line; 0 if unknown.
+// Returns the fraction of the time in which characters were on the line; 0 if it cannot be calculated.
 double line_share(const Connection& encoder, const Measurement& measurement) {
   const LineSettings& line = encoder.uri().line;
   const LinkKind link = encoder.unit().link;

@@ -44,7 +44,8 @@ Json campaign_json(const CampaignResult& result) {
   return json.set("check", check.set("taken", worth.taken).set("taken_deviation", worth.taken_deviation));
 }
 
-// Returns "88 bits with a checksum of 8: of the errors of 2 bits 440 pass, of fewer none".
+// Returns which undetected errors a checksum permits: "88 bits with a checksum of 8: of the errors of 2 bits 440 pass,
+// of fewer none".
 std::string worth_text(const CheckWorth& worth) {
   if (worth.check_bits == 0) return fmt::format("{} bits without a checksum", worth.frame_bits);
   const std::string size = fmt::format("{} bits with a checksum of {}", worth.frame_bits, worth.check_bits);

@@ -13,7 +13,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns a sentence about the commands of Verb::run whose names contain `word`, or "".
+// Returns a sentence that lists the commands for `absenc run` whose names contain `word`; "" if there is none.
 std::string related(const Unit& unit, std::string_view word) {
   std::string names;
   for (const Command& command : unit.commands) {

@@ -75,7 +75,8 @@ int run_conform(const Invocation& invocation) {
   return tell_verdict(invocation, conformance);
 }
 
-/// Serves a host through an SPI controller. It is here because the library has no libfuse.
+/// The emulated SPI controller at which a host is tested. It is not in the library, because the library does not use
+/// libfuse.
 class SpidevStage final : public HostStage {
  public:
   SpidevStage(const EncoderAddress& address, const std::string& name)

@@ -85,7 +85,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
 constexpr std::array<std::string_view, 7> capture_options{"--channel", "--baud", "--parity", "--raw-channels",
                                                           "--rate",    "--csv",  "--stats"};
 
-// Counts the annotations of a capture and forwards them to the printer, if they are printed.
+// Counts the annotations of a capture, and forwards them to the printer if there is one.
 struct Counted final : capture::AnnotationSink {
   Counted(CaptureStatistics& all, AnnotationPrinter* some) : statistics(all), printer(some) {}
   void put(const capture::Annotation& annotation) override {
@@ -148,7 +148,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
-// Identifies the protocol of a capture. Returns exit_usage even if one was found.
+// Identifies the protocol of a capture for a user who named none. Returns exit_usage even if a protocol was found.
 int identify_instead(std::string_view file) {
   print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
   Invocation search;

@@ -25,7 +25,8 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
-// Returns the address of the likeliest encoder on a port. Throws if none was found, or if chance may explain it.
+// Returns the address of the likeliest encoder on a port. Throws if no encoder was found, or only one that may be a
+// chance match.
 std::string identified(const std::string& port, Progress& progress) {
   LineSearch search = parse_search(port);
   search.limit = std::chrono::seconds(60);

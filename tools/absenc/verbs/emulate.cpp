@@ -73,20 +73,20 @@ std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
-// Returns the unit to emulate; with --spidev the unit's variant for SPI, if it has one.
+// Returns the unit to emulate; with the option --spidev, its variant for SPI if there is one.
 const Unit& emulated_unit(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
 }
 
-/// An option that puts the encoder on a kind of line, and whether the unit can use such a line.
+/// An option that selects the kind of line for the virtual encoder, and whether the unit can use such a line.
 struct Where {
   std::string_view option;
   std::string_view line;
   bool fits;
 };
 
-// Throws UsageError if --gap is given for a line on which it has no meaning.
+// Throws UsageError if the option --gap is given for a line on which it has no meaning.
 void check_gap(const Unit& unit, const Invocation& invocation) {
   if (!invocation.has("--gap")) return;
   const bool elsewhere = invocation.has("--port") || invocation.has("--spidev") || unit.link == LinkKind::can;
@@ -136,7 +136,7 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
 }
 
-/// The virtual line of the verb, its memory file and the duration of --for.
+/// The virtual line of the verb `emulate`, its memory file, and the duration given by --for.
 template <class Item>
 struct EmulationRun {
   EmulationRun(const Unit& unit, const Options& options, const Invocation& invocation)
@@ -148,7 +148,7 @@ struct EmulationRun {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// Calls `serve(machine)`, which returns notes about the line. Returns the exit status.
+  /// Calls `serve(machine)`, which runs the encoders and returns notes about the line. Returns the exit status.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();
@@ -345,7 +345,7 @@ DeviceSettings device_settings(const Invocation& invocation) {
 
 EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                const DeviceSettings& settings) {
-  // Settings of the option --also override those of the first encoder.
+  // For a further encoder, the settings in --also replace those of the first encoder.
   std::string base = fmt::format("sim:{}?", unit.id);
   const auto add = [&](const std::string& setting) {
     const std::string assigned = setting.substr(0, setting.find('=')) + '=';

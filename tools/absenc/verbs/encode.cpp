@@ -18,7 +18,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns the settings in the texts of --reply, each "NAME=VALUE NAME=VALUE".
+// Returns the settings in the values of the option --reply, each of the form "NAME=VALUE NAME=VALUE".
 std::vector<std::string> reply_settings(std::span<const std::string> texts) {
   std::vector<std::string> settings;
   for (const std::string& text : texts) {
@@ -39,7 +39,7 @@ std::string reply_of(const Invocation& invocation, const Unit& unit, const Comma
                                text_of(answered.error).description, text_of(answered.error).advice));
 }
 
-// On CAN and clocked links Unit::encode writes text, which is parsed here.
+// On CAN and clocked links Unit::encode writes the frame as text, which is parsed here.
 int run_encode(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));

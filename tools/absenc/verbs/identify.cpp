@@ -70,7 +70,7 @@ int identify_frames(const Invocation& invocation) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
     } catch (const UsageError& error) {
-      // A frame that is written for another kind of link is no frame of this unit.
+      // The text of the frame may have the form of another kind of link; then it is no frame of this unit.
       if (!unreadable) unreadable = error;
     }
   }
@@ -146,7 +146,7 @@ bool is_capture(std::string_view where) {
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// Throws Failure for a name that looks like that of a missing file, not of a port.
+// Throws Failure if no such file exists and `where` looks like the name of a file, not of a port.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;

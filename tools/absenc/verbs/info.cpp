@@ -105,10 +105,10 @@ class CardRows final : public FieldSink {
   const Command& command_;
 };
 
-/// Reads identity, settings and state of the encoder, as rows of text and as JSON.
+/// Reads the identity, settings and state of an encoder, and makes rows of text and JSON from them.
 class Survey {
  public:
-  /// `all`: collect every field and setting as rows.
+  /// Opens the encoder. `all`: collect every field and setting as rows.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -127,7 +127,7 @@ class Survey {
     FieldTable table;
     encoder_->report(table);
     for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
-    // A setting that the identity command reports too has the same row in the table already.
+    // A setting that the identity command also reports is already in the table.
     const auto is_shown = [&](const auto& row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); };
     if (command.verb == Verb::config_get && std::all_of(table.rows.begin(), table.rows.end(), is_shown)) return;
     add_heading(command);
@@ -162,17 +162,17 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// Returns the resolution of the first reading; before it, that of the options.
+  /// Returns the resolution that the encoder has reported; before its first report, that of the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
   Json answers = Json::object();
   Rows rows;
-  // Text below the rows: with `all` the reading; alarms in words, and why a position is doubtful.
+  // Text below the rows: alarms in words, why a position is doubtful, and with `all` the reading.
   std::string below;
-  std::vector<Trouble> troubles;  // first failure with each kind of error
+  std::vector<Trouble> troubles;  // the first failure for each kind of error
 
  private:
-  // Adds the rows that are not there yet: several commands may report the same value.
+  // Adds those of the rows `more` that are not in the table: several commands may report the same value.
   void add_new(Rows more) {
     for (std::vector<std::string>& row : more) {
       if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));
@@ -209,7 +209,7 @@ class Survey {
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
-    // If several settings fail one after another for the same reason, only the first gets a row.
+    // If several settings fail one after the other for the same reason, only the first of them gets a row.
     if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
@@ -220,8 +220,8 @@ class Survey {
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool all_;
-  bool heard_ = false;          // whether a reply has reported the resolution
-  std::string failed_setting_;  // reason why the last failed setting failed
+  bool heard_ = false;          // a reply has reported the resolution
+  std::string failed_setting_;  // reason why the setting that failed last could not be read
 };
 
 int run_info(const Invocation& invocation) {

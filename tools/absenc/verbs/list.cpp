@@ -49,7 +49,7 @@ std::string section(std::string_view heading, Rows rows) {
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {},
-                                    // Resolving cannot fail: the unit itself has this model.
+                                    // The result is not checked, because a model of the unit itself is always valid.
                                     options));
   return line_of(unit.link, line_settings(unit, options));
 }
@@ -204,7 +204,7 @@ Json models_json(const Unit& unit) {
   });
 }
 
-// Returns `json` with the key "role" if the field or option has a role.
+// Returns `json`, with the key "role" added if the field or option has a role.
 Json with_role(Json json, Role role) {
   const std::string_view name = name_of(role);
   return name.empty() ? json : json.set("role", name);
@@ -297,7 +297,7 @@ Json conditions_json(const Unit& unit) {
   });
 }
 
-// Returns what `conform` and `conform-host` test: the demands of the unit's document.
+// Returns a text about the verbs `conform` and `conform-host`: which demands of the unit's document they test.
 Json clauses_json(const Unit& unit) {
   const auto json = [](const auto& clause) {
     return Json::object().set("id", clause.id).set("paragraph", clause.paragraph).set("words", clause.words);

@@ -29,7 +29,7 @@ Json addresses_json(const MemoryImage& image) {
   });
 }
 
-// Returns the fewest writes that a byte of `image` endures, in words; "" if unknown.
+// Returns in words how many writes the bytes of `image` endure, by the weakest of them; "" if unknown.
 std::string write_life(const Unit& unit, const MemoryImage& image) {
   const MemoryArea* least = nullptr;
   for (const auto& [at, value] : image) {
@@ -97,7 +97,8 @@ class MemoryWrite {
       return;
     }
     print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
-    if (!asks_) print_note(cost());  // without a question the number of differing bytes and the wear are printed here
+    // if the user is asked, the question contains the number of differing bytes and the wear
+    if (!asks_) print_note(cost());
   }
 
   int finish() const {
@@ -126,7 +127,7 @@ class MemoryWrite {
     } catch (const os::Interrupted&) {
       words = "interrupted";
       answer.set("message", words);
-    } catch (const OutputClosed&) {  // standard output is closed, so the user may not have seen the bytes to be written
+    } catch (const OutputClosed&) {  // the user may not have seen the list of bytes to be written
       words = "nobody reads standard output";
     } catch (const EncoderFailure& failure) {
       words = failure.what();

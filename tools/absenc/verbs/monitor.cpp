@@ -104,7 +104,7 @@ class Controls {
 
   Watches* watches_;
   View view_;
-  const Command* asked_ = nullptr;  // command that the question is about; used only while a question is shown
+  const Command* asked_ = nullptr;  // command that the user is asked about; used only while a question is shown
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
@@ -117,7 +117,7 @@ void run_on_screen(Screen& screen, Watches& watches, Time end) {
 
 // ---- Output without a terminal
 
-/// Prints a line to standard error when the state of an encoder changes.
+/// Prints a line to standard error whenever the state of an encoder changes.
 class StateChanges {
  public:
   void tell(const std::vector<MonitoredEncoder>& encoders) {
@@ -138,7 +138,7 @@ class StateChanges {
 
 void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   StateChanges changes;
-  // Time of the first lines; the encoders have up to half a second to reply before.
+  // Time at which the first lines are printed: until then the encoders have up to half a second to reply.
   Time next = os::now() + std::min<Time>(interval, 500ms);
   try {
     while (os::now() < end) {
@@ -154,7 +154,7 @@ void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   }
 }
 
-// Prints a summary of each encoder. Returns whether each encoder was read and none has ended.
+// Prints a summary for each encoder. Returns whether every encoder was read at least once and no thread has given up.
 bool summarize(const Watches& watches, Time start, Time processor) {
   std::uint64_t readings = 0;
   bool all_read = true;

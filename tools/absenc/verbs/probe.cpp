@@ -36,7 +36,7 @@ void show(const Unit& unit, std::span<const OptionEvidence> evidence) {
   print_line(table(rows));
 }
 
-// Returns whether one and the same frame excludes all values, for one and the same reason.
+// Returns whether all values of an option are excluded by the same frame and for the same reason.
 bool same_reason(std::span<const OptionEvidence> evidence) {
   return std::all_of(evidence.begin(), evidence.end(), [&](const OptionEvidence& one) {
     return !one.possible && one.capture == evidence.front().capture && one.why == evidence.front().why;

@@ -26,7 +26,7 @@ namespace {
 
 enum class Format : std::uint8_t { human, json, csv };
 
-// Returns the speed as "   12.0 ± 0.3 rpm"; "" if it is unknown, or the shaft may be at rest.
+// Returns the speed as "   12.0 ± 0.3 rpm"; "" if the speed is unknown, or not greater than its uncertainty.
 std::string speed_text(const Sample& sample) {
   if (!sample.speed_valid || std::abs(sample.speed) <= sample.speed_uncertainty) return {};
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
@@ -34,7 +34,7 @@ std::string speed_text(const Sample& sample) {
 
 class Display {
  public:
-  /// With `speeds`, the line of a reading contains the speed of a shaft that turns.
+  /// Makes a printer of readings. With `speeds`, the line of a reading contains the speed if the shaft turns.
   Display(const Encoder& live, Format format, bool speeds)
       : live_(&live),
         format_(format),
@@ -80,7 +80,7 @@ class Display {
     if (format_ != Format::human) return show_row(sample);
     print_line(reading_text(unit, reading, doubt_of(sample)) + (speeds_ ? speed_text(sample) : "") +
                angles_text(live_->joint(), sample));
-    // An alarm that was raised counts as raised until the encoder reports it clear.
+    // A raised alarm counts as raised until the encoder reports that it is clear.
     const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
     if (alarms == alarms_) return;
     alarms_ = alarms;
@@ -151,7 +151,7 @@ int run_read(const Invocation& invocation) {
   const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
-    // The printed readings do not show that damaged frames of a stream were dropped.
+    // The printed readings do not show that damaged frames of a stream were dropped, so the counters are printed.
     if (live.counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }

@@ -43,7 +43,8 @@ class RecordingProgress {
 
 // Prints the first restart of the position, and each loss and return of the port.
 void tell(const Sample& sample, const Encoder& live, RecordingProgress& report) {
-  if (sample.restarted && live.restarts() == 1) {  // printed only for the first restart; the summary has the number
+  // only the first restart is printed; the summary has the number of restarts
+  if (sample.restarted && live.restarts() == 1) {
     report.clear();
     print_message(sample.message);
   }
@@ -72,7 +73,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
   return settings;
 }
 
-// Prints a summary of the recording. `whole`: no file of it was removed, replaced or cut.
+// Prints a summary of the recording. `whole`: no file of the recording was removed, replaced or cut.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings,
                                  recording.counts().failures, to_text(os::now() - recording.start()),

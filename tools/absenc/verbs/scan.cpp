@@ -20,7 +20,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Collects the encoders that a scan finds, a record for each.
+/// Collects the encoders that a scan of the line finds, with a record for each.
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;

@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-// Period of checks for a signal, because another thread may receive it.
+// Time after which the main thread checks again for a signal, because another thread may receive it.
 constexpr Time between_looks = std::chrono::milliseconds(100);
 
 // Sets host and port of the server from "HOST:PORT", "HOST" or ":PORT". Throws UsageError.
@@ -39,10 +39,10 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-// The only option in `outlet_parameters` that has no value.
+// This is the only option in `outlet_parameters` that takes no value.
 constexpr std::string_view home_assistant = "--home-assistant";
 
-// An option that sets the same value as a setting of absenc.toml.
+// An option that sets the same value as a setting in absenc.toml, and the section of that file.
 struct OutletParameter {
   std::string_view option;
   std::string_view section;

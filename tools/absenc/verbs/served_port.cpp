@@ -33,7 +33,7 @@ void tell_of_port(const std::string& name, PortEvent what, std::string_view why)
   }
 }
 
-// Runs the machine until a signal or the time `end`; opens a lost port again.
+// Runs the machine until a signal arrives or the time `end` is reached; opens a lost port again.
 template <class Item, class Open>
 void serve_as(Machine<Item>& machine, const std::string& name, Time end, const Open& open) {
   const auto with_end = [&] {

@@ -31,7 +31,7 @@ constexpr std::string_view replies_missing =
     "only requests came: this is the host's pair of a line with two pairs, or the encoder does not answer\n"
     "  Try: a second receiver on the encoder's pair, with a second `absenc tap`; is the encoder switched on?";
 
-// Counts annotations and the rates of requests. Forwards annotations to the printer, if any.
+// Counts annotations and measures the rates of requests. Forwards the annotations to the printer, if there is one.
 struct TapCounts final : capture::AnnotationSink {
   TapCounts(const Unit& unit, const Options& options, const TickClock& clock, AnnotationPrinter* some)
       : statistics(unit, options, clock), rates(unit, options), printer(some) {}
@@ -95,7 +95,7 @@ void introduce_tap(const TapRun& run) {
       run.receiver().place(), tool::to_text(run.receiver().latency())));
 }
 
-// Identifies the protocol of the tapped line unless it is given. Returns false if none was found.
+// Identifies the protocol of the tapped line, unless the user has given it. Returns false if none was found.
 bool settle_tap(TapRun& run, bool is_given) {
   Progress progress;
   const bool settled = run.settle([&](const std::string& text) { progress.show(text); });

@@ -29,7 +29,7 @@ std::vector<OptionText> vector_settings(const Vector& vector) {
   return settings;
 }
 
-// A vector stores a frame as bytes, or as the text of a CAN frame or clocked word.
+// Returns the frame of a reference vector, which stores it as bytes, or as the text of a CAN frame or clocked word.
 WireFrame vector_frame(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
   if (unit.link != LinkKind::can && !carries_bits(unit.link)) return {{bytes.begin(), bytes.end()}, 0, {}};
