@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-# Installation and packages by `cmake --install` and `cpack`. Components: absenc (the command), libabsenc-dev,
-# python3-absenc.
+# Installation and packages by `cmake --install` and `cpack`. Components: absenc (the command), absenc-serve,
+# absenc-hdf5, libabsenc-dev, python3-absenc.
 include(CMakePackageConfigHelpers)
 
 set(absenc_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/absenc")
 set(absenc_pkgconfig_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 set(absenc_libraries absenc)
-set(absenc_pkgconfig_names absenc)
-if(TARGET absenc-client)
-  list(APPEND absenc_libraries absenc-os absenc-capture absenc-client)
-  list(APPEND absenc_pkgconfig_names absenc-client)
-endif()
+foreach(name IN ITEMS os search client configuration capture captures recording hdf5 gpio)
+  if(TARGET absenc-${name} AND TARGET absenc-client)
+    list(APPEND absenc_libraries absenc-${name})
+  endif()
+endforeach()
 install(TARGETS ${absenc_libraries} EXPORT absenc ARCHIVE COMPONENT libabsenc-dev
         FILE_SET HEADERS COMPONENT libabsenc-dev)
 install(EXPORT absenc NAMESPACE absenc:: FILE absencConfig.cmake DESTINATION "${absenc_package_dir}"
@@ -23,25 +23,49 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATIO
 # The .pc files contain the prefix as a path relative to their folder, so that the installed tree can be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
-set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
-    ${fmt_LIBRARIES} ${tomlplusplus_LIBRARIES} ${hdf5_LIBRARIES})
-list(TRANSFORM absenc_client_needs PREPEND -l)
-list(JOIN absenc_client_needs " " absenc_client_needs)
-string(APPEND absenc_client_needs " ${CMAKE_THREAD_LIBS_INIT}")
-foreach(name IN LISTS absenc_pkgconfig_names)
-  configure_file("cmake/${name}.pc.in" ${name}.pc @ONLY)
+# absenc_pkgconfig(NAME DESCRIPTION REQUIRES LIBRARIES...): writes and installs NAME.pc.
+function(absenc_pkgconfig name description requires)
+  list(TRANSFORM ARGN PREPEND -l OUTPUT_VARIABLE libraries)
+  list(JOIN libraries " " libraries)
+  configure_file(cmake/absenc.pc.in ${name}.pc @ONLY)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}.pc" DESTINATION "${absenc_pkgconfig_dir}"
           COMPONENT libabsenc-dev)
-endforeach()
+endfunction()
+absenc_pkgconfig(absenc "${PROJECT_DESCRIPTION}" "" absenc)
+if(TARGET absenc-client)
+  set(same "= ${PROJECT_VERSION}")
+  absenc_pkgconfig(absenc-client "Absolute encoders by address: read, set up, emulate" "absenc ${same}"
+                   absenc-client absenc-search absenc-os)
+  absenc_pkgconfig(absenc-configuration "Names of absenc.toml for absenc-client" "absenc-client ${same}"
+                   absenc-configuration)
+  absenc_pkgconfig(absenc-captures "Captures of logic analysers, decoded" "absenc-client ${same}" absenc-captures
+                   absenc-capture minizip z ${libdeflate_LIBRARIES} ${hwy_LIBRARIES})
+  absenc_pkgconfig(absenc-recording "Recordings of encoders as CSV and JSON lines" "absenc-client ${same}"
+                   absenc-recording)
+endif()
+if(TARGET absenc-hdf5)
+  absenc_pkgconfig(absenc-hdf5 "HDF5 for absenc-recording" "absenc-recording ${same}" absenc-hdf5
+                   ${absenc_hdf5_libraries})
+endif()
+if(TARGET absenc-gpio)
+  absenc_pkgconfig(absenc-gpio "Pulses on GPIO lines for absenc-client" "absenc-client ${same}" absenc-gpio
+                   ${gpiod_LIBRARIES})
+endif()
 
 install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
 
 # The man page and the bash completion are written by a program that links the tables of the command.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
-  install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
-  install(FILES docs/serve.md docs/mqtt.md docs/mqtt-schema.json docs/grafana-dashboard.json
-          DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
+  if(TARGET absenc-serve)
+    install(TARGETS absenc-serve DESTINATION lib/absenc COMPONENT absenc-serve)
+    install(FILES cmake/debian/absenc.service DESTINATION lib/systemd/system COMPONENT absenc-serve)
+    install(FILES docs/serve.md docs/mqtt.md docs/mqtt-schema.json docs/grafana-dashboard.json
+            DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/absenc-serve" COMPONENT absenc-serve)
+  endif()
+  if(TARGET absenc-hdf5-plugin)
+    install(TARGETS absenc-hdf5-plugin DESTINATION lib/absenc COMPONENT absenc-hdf5)
+  endif()
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     add_library(absenc-manual-objects OBJECT tools/manual/completion.cpp tools/manual/man_page.cpp)
     absenc_settings(absenc-manual-objects)
@@ -49,7 +73,7 @@ if(TARGET absenc-command)
     add_executable(absenc-write-manual tools/manual/main.cpp)
     absenc_settings(absenc-write-manual)
     target_compile_definitions(absenc-write-manual PRIVATE ABSENC_VERSION="${PROJECT_VERSION}")
-    target_link_libraries(absenc-write-manual PRIVATE absenc-manual-objects absenc-command-objects)
+    target_link_libraries(absenc-write-manual PRIVATE absenc-manual-objects absenc-command-objects absenc-shared-objects)
 
     set(absenc_man_page "${CMAKE_CURRENT_BINARY_DIR}/manual/absenc.1")
     set(absenc_completion "${CMAKE_CURRENT_BINARY_DIR}/manual/absenc")

@@ -6,8 +6,11 @@ get_filename_component(absenc_root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
 set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
+# Folders whose sources belong to libraries of their own, because they need libraries of the system.
+set(absenc_separate_folders absenc/os/cuse absenc/os/without_cuse absenc/os/gpio)
+
 # Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
-# in absenc/os/cuse are included only if that folder is given.
+# in the separate folders are included only if that folder is given.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)
@@ -18,9 +21,11 @@ function(absenc_sources result)
     list(APPEND found ${sources})
   endforeach()
   list(FILTER found EXCLUDE REGEX "_(test|fuzz|bench)\\.cpp$")
-  if(NOT "absenc/os/cuse" IN_LIST ARGN)
-    list(FILTER found EXCLUDE REGEX "/absenc/os/cuse/")
-  endif()
+  foreach(folder IN LISTS absenc_separate_folders)
+    if(NOT folder IN_LIST ARGN)
+      list(FILTER found EXCLUDE REGEX "/${folder}/")
+    endif()
+  endforeach()
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()
 

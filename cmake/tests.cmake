@@ -4,6 +4,8 @@
 # all other tests name units.
 find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(libzip REQUIRED libzip)
 include(GoogleTest)
 
 # Tests with the label `long`: `./dev test` skips them, `./dev test --all` runs them.
@@ -40,7 +42,8 @@ function(absenc_test_settings target)
   if(ABSENC_FUZZ)  # fuzzers do not use the coverage of tests, which takes a quarter of the compile time
     target_compile_options(${target} PRIVATE -fsanitize-coverage=0)
   endif()
-  target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
+  target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture ${libzip_LIBRARIES} rapidcheck GTest::gtest_main
+                                          GTest::gmock)
 endfunction()
 
 # The path of the sources is defined only for this test, because it would make the compiler cache useless for others.
@@ -66,7 +69,7 @@ function(absenc_test name)
   set_target_properties(${name}_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
   # these are compiled with other settings than the precompiled headers, so they cannot use them
   if(name STREQUAL "command" OR name STREQUAL "manual")
-    target_link_libraries(${name}_test PRIVATE absenc-command-objects $<TARGET_NAME_IF_EXISTS:absenc-${name}-objects>)
+    target_link_libraries(${name}_test PRIVATE absenc-command-objects absenc-shared-objects $<TARGET_NAME_IF_EXISTS:absenc-${name}-objects>)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
@@ -138,8 +141,8 @@ endif()
 if(TARGET absenc-client)
   absenc_folder_test(client absenc/client GLOB_RECURSE)
   target_sources(client_test PRIVATE tests/kit/frames.cpp)
-  target_link_libraries(client_test PRIVATE absenc::client ${hdf5_LIBRARIES})
-  target_include_directories(client_test SYSTEM PRIVATE ${hdf5_INCLUDE_DIRS})
+  target_link_libraries(client_test PRIVATE absenc::client absenc::configuration absenc::captures absenc::recording
+                                            absenc::hdf5 ${absenc_hdf5_libraries} ${absenc_fmt})
   if(NOT ABSENC_UNITS)  # this test is an executable of its own, because it replaces malloc
     absenc_test(reading_allocations tests/reading_allocations.cpp)
     target_link_libraries(reading_allocations_test PRIVATE absenc::client)
@@ -148,9 +151,9 @@ if(TARGET absenc-client)
     endif()
   endif()
 endif()
-if(TARGET absenc-serve AND NOT ABSENC_UNITS)
+if(TARGET absenc-server AND NOT ABSENC_UNITS)
   absenc_folder_test(serve absenc/serve GLOB)
-  target_link_libraries(serve_test PRIVATE absenc::serve)
+  target_link_libraries(serve_test PRIVATE absenc::server absenc::configuration ${absenc_fmt})
 endif()
 if(TARGET absenc-command-objects AND NOT ABSENC_UNITS)
   absenc_folder_test(command tools/absenc GLOB_RECURSE)
@@ -238,7 +241,7 @@ foreach(source IN LISTS examples)
   absenc_settings(example_${name})
   set_target_properties(example_${name} PROPERTIES OUTPUT_NAME ${name}
                         RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/examples")
-  target_link_libraries(example_${name} PRIVATE absenc::client)
+  target_link_libraries(example_${name} PRIVATE absenc::client absenc::configuration absenc::captures absenc::recording)
   add_dependencies(change-tests example_${name})
   set(example_arguments)
   if(name STREQUAL "decode_capture")

@@ -16,9 +16,21 @@ from command_support import absenc
 
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
-VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+VERSION = (SOURCE / "VERSION").read_text().strip()
+SERVE_DOCUMENTS = {f"share/doc/absenc-serve/{name}"
+                   for name in ("serve.md", "mqtt.md", "mqtt-schema.json", "grafana-dashboard.json")}
 # Man pages made from the pages of docs/, one for each page.
 GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
+
+# The libraries in the order in which each needs those before it; absenc::client is all that reads an encoder.
+PARTS = ("absenc", "absenc-os", "absenc-search", "absenc-client", "absenc-configuration", "absenc-capture",
+         "absenc-captures", "absenc-recording", "absenc-hdf5", "absenc-gpio")
+PKG_CONFIG = ("absenc", "absenc-client", "absenc-configuration", "absenc-captures", "absenc-recording", "absenc-hdf5",
+              "absenc-gpio")
+# Shared libraries of a program that links only absenc::client: those of C++ and C.
+STANDARD = {"linux-vdso", "libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86-64", "ld-linux-aarch64"}
+# Names that the symbols of such a program must not contain, because they are from other libraries.
+FOREIGN = re.compile(r"nlohmann|toml::|\bH5[A-Z]|\bhwy::|\b(zip|unz)[A-Z]|libdeflate|\bgpiod_line_find")
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
 # Expected output of the example: it prints the speed as soon as enough positions for an average were read.
@@ -122,6 +134,52 @@ an alarm or a state that the encoder reports says that the position does not hol
 a change that is not possible: not_sent
 """
 
+# A program that uses everything that extends absenc::client.
+EXTENDED = r"""
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/configuration.hpp"
+#include "absenc/client/decode.hpp"
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/hdf5.hpp"
+#include "absenc/client/recording.hpp"
+#include "absenc/os/gpio.hpp"
+
+using namespace absenc;
+
+int main(int, char** arguments) try {
+  client::Encoder encoder = client::open("elbow");
+  client::Recording recording({.path = arguments[1], .encoder = "elbow", .count = 3}, encoder);
+  std::printf("%d", recording.run());
+  for (const client::Row& row : client::decode(arguments[2], "tformat")) {
+    std::printf(" %s", client::to_text(row.values[0]).c_str());
+    break;
+  }
+  std::printf("\n");
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
+"""
+# A program that opens each kind of place; none of them is there.
+EACH_PLACE = r"""
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/encoder.hpp"
+
+int main(int count, char** places) {
+  for (int i = 1; i < count; ++i) {
+    try {
+      absenc::client::open(places[i]).read();
+    } catch (const std::exception& failure) {
+      std::printf("%s\n", failure.what());
+    }
+  }
+}
+"""
+
 PROJECT = f"""
 cmake_minimum_required(VERSION 3.25)
 project(outside LANGUAGES CXX)
@@ -132,6 +190,8 @@ endif()
 find_package(absenc {VERSION} REQUIRED)
 add_executable(by_name {BY_NAME})
 target_link_libraries(by_name PRIVATE absenc::client)
+add_executable(extended extended.cpp)
+target_link_libraries(extended PRIVATE absenc::configuration absenc::captures absenc::recording absenc::hdf5 absenc::gpio)
 add_executable(firmware firmware.cpp)
 target_link_libraries(firmware PRIVATE absenc::absenc)
 """
@@ -180,7 +240,7 @@ def pkg_config(root, *arguments):
 def public_headers():
     """Returns the paths, below the installation folder, of the public headers."""
     patterns = [f"{layer}/**/*.hpp" for layer in ("core", "link", "protocol", "host", "sim")]
-    patterns += ["client/*.hpp", "os/error.hpp"]
+    patterns += ["client/*.hpp", "os/error.hpp", "os/gpio.hpp"]
     sources = [path for pattern in patterns for path in (SOURCE / "absenc").glob(pattern)]
     return {f"include/{path.relative_to(SOURCE)}" for path in sources if "test" not in path.name}
 
@@ -214,12 +274,11 @@ class Installed(Case):
         self.assertEqual(python - {module}, {package + path for path in files_below(SOURCE / "python/absenc")
                                              if "__pycache__" not in path})
         self.assertEqual({re.sub(r"^lib/.*/", "lib/", path) for path in files - headers - python}, {
-            "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/libabsenc-capture.a", "lib/libabsenc-client.a",
-            "lib/absenc.pc", "lib/absenc-client.pc",
+            "bin/absenc", *(f"lib/lib{name}.a" for name in PARTS), *(f"lib/{name}.pc" for name in PKG_CONFIG),
+            "lib/absenc-serve", "lib/hdf5.so",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
-            "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "share/doc/absenc/mqtt.md",
-            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service", *GUIDE})
+            "share/doc/absenc/LICENSE", *SERVE_DOCUMENTS, "lib/absenc.service", *GUIDE})
         self.assertEqual(headers, public_headers())
 
     def test_headers_include_only_installed_ones(self):
@@ -250,7 +309,8 @@ class Installed(Case):
                 self.assertNotIn(str(place).encode() + b"/", content, path)
 
     def test_command_runs(self):
-        self.assertEqual(run(self.root / "bin/absenc", "--version"), f"absenc {VERSION}\n")
+        self.assertRegex(run(self.root / "bin/absenc", "--version"),
+                         rf"\Aabsenc {VERSION}\ncommit \w+\nfor {os.uname().machine}\nbuilt in: .+\n\Z")
         self.assertIn("0 turns", run(self.root / "bin/absenc", "read", "sim:tformat"))
 
     def test_cmake_project_finds_package(self):
@@ -258,14 +318,46 @@ class Installed(Case):
         project.mkdir()
         (project / "CMakeLists.txt").write_text(PROJECT)
         (project / "firmware.cpp").write_text(FIRMWARE)
+        (project / "extended.cpp").write_text(EXTENDED)
         run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.root}")
         run("cmake", "--build", project / "build")
         self.assertRegex(run(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
         self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
+        self.assert_is_small(project / "build/by_name")
+        self.assert_is_extended(project / "build/extended", project)
 
-    def program(self, name, source, library):
-        """Compiles a program, and links it with the flags that pkg-config prints for `library`."""
-        run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", library), "-o",
+    def assert_is_small(self, program):
+        """Asserts that the program loads only libraries of C and C++, and contains no other library either."""
+        loaded = {Path(line.split()[0]).name.split(".so")[0] for line in run("ldd", program).splitlines()}
+        self.assertIn("libstdc++", loaded)
+        self.assertEqual(loaded - STANDARD, set())
+        symbols = run("nm", "-C", program)
+        self.assertIn("absenc::client::", symbols)
+        self.assertEqual({found[0] for found in FOREIGN.finditer(symbols)}, set())
+
+    def assert_is_extended(self, program, folder):
+        (folder / "absenc.toml").write_text('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n')
+        for name in ("log.csv", "log.h5"):
+            said = run(program, folder / f"{program.name}-{name}", SOURCE / "examples/tformat.txt",
+                       env={**os.environ, "ABSENC_CONFIG": str(folder / "absenc.toml")})
+            self.assertRegex(said, r"^1 \S+")
+        self.assertEqual((folder / f"{program.name}-log.h5").read_bytes()[:4], b"\x89HDF")
+
+    def test_small_library_opens_each_kind_of_place(self):
+        source = self.folder / "each_place.cpp"
+        source.write_text(EACH_PLACE)
+        program = self.program("each_place", source, "absenc-client")
+        self.assert_is_small(program)
+        said = run(program, "tformat:/dev/ttyNONE", "tformat:tcp:127.0.0.1:1", "ssi:spi:/dev/spidevNONE",
+                   "raa38-can:canNONE", "elbow", "raa38:/dev/null?baud=115200&trigger=gpio:X").splitlines()
+        for line, expected in zip(said, ("/dev/ttyNONE", "127.0.0.1 port 1", "/dev/spidevNONE", "canNONE",
+                                         "build it with absenc::configuration"), strict=False):
+            self.assertIn(expected, line)
+        self.assertGreaterEqual(len(said), 6)
+
+    def program(self, name, source, *libraries):
+        """Compiles a program, and links it with the flags that pkg-config prints for `libraries`."""
+        run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", *libraries), "-o",
             self.folder / name)
         return self.folder / name
 
@@ -277,8 +369,14 @@ class Installed(Case):
         endings = self.folder / "endings.cpp"
         endings.write_text(ENDINGS)
         self.assertEqual(run(self.program("endings", endings, "absenc-client")), ENDINGS_SAY)
-        for library in ("absenc", "absenc-client"):
+        extended = self.folder / "extended.cpp"
+        extended.write_text(EXTENDED)
+        self.assert_is_extended(self.program("extended_by_pkg_config", extended, "absenc-configuration", "absenc-captures",
+                                             "absenc-hdf5", "absenc-gpio"), self.folder)
+        for library in PKG_CONFIG:
             self.assertEqual(pkg_config(self.root, "--modversion", library), [VERSION])
+        self.assertEqual([flag for flag in pkg_config(self.root, "--libs", "absenc-client") if flag.startswith("-l")],
+                         ["-labsenc-client", "-labsenc-search", "-labsenc-os", "-labsenc"])
         self.assertEqual({flag for flag in pkg_config(self.root, "--libs", "absenc") if flag.startswith("-l")},
                          {"-labsenc"})
 
@@ -291,6 +389,24 @@ class Installed(Case):
         run("cmake", "--install", parent / "build", "--prefix", parent / "installed")
         self.assertEqual(files_below(parent / "installed"), set())
         self.assertFalse((parent / "build/CPackConfig.cmake").exists())
+
+    def test_compiler_without_cpp20_is_refused_in_one_sentence(self):
+        old = self.folder / "old-g++"
+        old.write_text('#!/bin/sh\nexec g++ "$@" -std=c++17\n')
+        old.chmod(0o755)
+        done = subprocess.run(["cmake", "-G", "Ninja", "-S", SOURCE, "-B", self.folder / "old",
+                               f"-DCMAKE_CXX_COMPILER={old}"], capture_output=True, text=True, timeout=100)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn(f"absenc needs a compiler for C++20 (g++ 11, clang 14 or newer), which {old} is not.",
+                      " ".join(done.stderr.split()))
+        self.assertLess(len(done.stderr.splitlines()), 12)
+
+    def test_options_stand_in_the_table(self):
+        cmake = (SOURCE / "CMakeLists.txt").read_text()
+        options = re.findall(r"^(?:option|set)\((ABSENC_\w+) (?:\"|\"\" CACHE)", cmake, re.MULTILINE)
+        table = re.findall(r"^\| `(ABSENC_\w+)` \|", (SOURCE / "docs/cpp.md").read_text(), re.MULTILINE)
+        self.assertGreater(len(options), 10)
+        self.assertEqual(table, options)
 
 
 class ManPage(Case):
@@ -426,8 +542,9 @@ class Packages(unittest.TestCase):
     def depends(self, package):
         return set(re.findall(r"[a-z0-9.+-]+(?= \(|,|$)", self.field(package, "Depends")))
 
-    def test_there_are_three_with_metadata(self):
-        sections = {"absenc": "electronics", "libabsenc-dev": "libdevel", "python3-absenc": "python"}
+    def test_each_has_its_metadata(self):
+        sections = {"absenc": "electronics", "absenc-serve": "electronics", "absenc-hdf5": "electronics",
+                    "libabsenc-dev": "libdevel", "python3-absenc": "python"}
         self.assertEqual(set(self.packages), set(sections))
         for name, section in sections.items():
             with self.subTest(name):
@@ -437,50 +554,69 @@ class Packages(unittest.TestCase):
                 self.assertEqual(self.field(name, "Architecture"), run("dpkg", "--print-architecture").strip())
                 self.assertRegex(self.field(name, "Maintainer"), r"^absenc developers <\S+@\S+>$")
                 self.assertRegex(self.field(name, "Description"), r"\A[A-Z].+[^.]\n .+")
-        self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), 3)
+        self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), len(sections))
 
-    def test_command_needs_no_development_packages(self):
-        for library in ("libc6", "libstdc++6", "libfmt"):
-            self.assertIn(library, self.field("absenc", "Depends"))
-        self.assertEqual({name for name in self.depends("absenc") if name.endswith("-dev")}, set())
+    def test_command_loads_few_libraries(self):
+        loaded = [line.split()[0] for line in run("ldd", self.command / "bin/absenc").splitlines()]
+        self.assertLessEqual(len(loaded), 20)
+        self.assertEqual([name for name in loaded if re.search("hdf5|curl|gnutls|ldap|microhttpd|sqlite|mosquitto", name)], [])
 
-    def test_library_depends_on_linked_libraries(self):
-        linked = [flag[2:] for flag in pkg_config(self.development, "--libs", "absenc-client")
+    def test_packages_depend_on_what_they_load(self):
+        for package, libraries in {"absenc": ("libc6", "libstdc++6", "libminizip1"),
+                                   "absenc-serve": ("libmicrohttpd12", "libmosquitto1", "libsqlite3-0", "absenc"),
+                                   "absenc-hdf5": ("libhdf5-103-1", "absenc")}.items():
+            for library in libraries:
+                self.assertIn(library, self.field(package, "Depends"))
+            self.assertEqual({name for name in self.depends(package) if name.endswith("-dev")}, set())
+        self.assertNotIn("hdf5", self.field("absenc", "Depends"))
+
+    def test_library_suggests_linked_libraries(self):
+        linked = [flag[2:] for name in PKG_CONFIG for flag in pkg_config(self.development, "--libs", name)
                   if flag.startswith("-l") and not flag.startswith("-labsenc")]
         self.assertGreater(len(linked), 3)
         files = [os.path.normpath(run("g++", f"-print-file-name=lib{name}.so").strip()) for name in linked]
         owners = {run("dpkg", "-S", file).split(":")[0] for file in files}
-        self.assertEqual(self.depends("libabsenc-dev"), owners)
+        suggested = set(self.field("libabsenc-dev", "Suggests").split(", "))
+        self.assertEqual(suggested, owners - {"zlib1g-dev"})  # which libminizip-dev depends on
+        self.assertEqual(self.field("libabsenc-dev", "Depends"), "")
 
     def test_each_installed_file_is_in_one_package(self):
         run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
         installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1", *GUIDE}
-        added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright",
-                 "share/doc/python3-absenc/copyright", *(f"{page}.gz" for page in GUIDE)}
-        command, development, python = map(files_below, (self.command, self.development, self.python))
-        self.assertEqual(len(command | development | python), len(command) + len(development) + len(python))
-        self.assertEqual(command | development | python, installed | added)
-        self.assertIn("lib/python3/dist-packages/absenc/py.typed", python)
-        self.assertEqual(command, {
-            "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
-            "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
-            "share/doc/absenc/mqtt.md", "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json",
-            "lib/systemd/system/absenc.service", *(f"{page}.gz" for page in GUIDE)})
-        for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
-            self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
+        own = {f"share/doc/{name}/{file}" for name in self.packages for file in ("copyright", "changelog.gz")}
+        overrides = {f"share/lintian/overrides/{path.stem}" for path in (SOURCE / "cmake/debian").glob("*.lintian-overrides")}
+        added = {"share/man/man1/absenc.1.gz", *(f"{page}.gz" for page in GUIDE), *own, *overrides}
+        held = {name: files_below(self.folder / name / "usr") for name in self.packages}
+        self.assertEqual(sum(map(len, held.values())), len(set.union(*held.values())))
+        self.assertEqual(set.union(*held.values()), installed | added)
+        self.assertIn("lib/python3/dist-packages/absenc/py.typed", held["python3-absenc"])
+        files = {name: {path for path in paths if not path.startswith("share/")} for name, paths in held.items()}
+        self.assertEqual(files["absenc"], {"bin/absenc"})
+        self.assertEqual(files["absenc-serve"], {"lib/absenc/absenc-serve", "lib/systemd/system/absenc.service"})
+        self.assertEqual(files["absenc-hdf5"], {"lib/absenc/hdf5.so"})
+        self.assertTrue(SERVE_DOCUMENTS < held["absenc-serve"])
 
     def test_files_belong_to_root_and_are_readable(self):
         for package in self.packages.values():
             for line in run("dpkg-deb", "-c", package).splitlines():
-                mode = "-rwxr-xr-x" if line.endswith("bin/absenc") else "-rw-r--r--"
+                mode = "-rwxr-xr-x" if line.endswith(("bin/absenc", "/absenc-serve")) else "-rw-r--r--"
                 mode = "drwxr-xr-x" if line.endswith("/") else mode
                 self.assertTrue(line.startswith(f"{mode} root/root "), line)
 
     def test_unpacked_command_runs(self):
         self.assertIn("turns", run(self.command / "bin/absenc", "read", "sim:tformat"))
 
+    def test_command_without_its_parts_says_what_to_install(self):
+        for arguments, package in ((("serve",), "absenc-serve"),
+                                   (("record", "sim:tformat", "--output", self.folder / "x.h5", "--count", "1"), "absenc-hdf5")):
+            done = subprocess.run([self.command / "bin/absenc", *arguments], capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn(f"Install the package {package}", done.stderr)
+        self.assertIn("--history", run(self.command / "bin/absenc", "serve", "--help"))
+        self.assertFalse((self.folder / "x.h5").exists())
+
     def test_unpacked_module_runs(self):
-        for package in ("libc6", "libfmt", "python3", "python3-numpy"):
+        for package in ("libc6", "python3", "python3-numpy"):
             self.assertIn(package, self.field("python3-absenc", "Depends"))
         modules = self.python / "lib/python3/dist-packages"
         run("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/pulse_wire.hpp"
 
-#include <gpiod.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 
@@ -16,20 +15,27 @@ int WireKernel::set_modem_lines(int descriptor, unsigned long request, int lines
   return ::ioctl(descriptor, request, &lines);
 }
 
-gpiod_line* WireKernel::find_gpio(const std::string& name) { return ::gpiod_line_find(name.c_str()); }
-
-int WireKernel::request_gpio(gpiod_line* line, bool active_low) {
-  return ::gpiod_line_request_output_flags(line, "absenc", active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0, 0);
+gpiod_line* WireKernel::find_gpio(const std::string&) {
+  errno = ENOSYS;
+  return nullptr;
 }
 
-int WireKernel::set_gpio(gpiod_line* line, int value) { return ::gpiod_line_set_value(line, value); }
+int WireKernel::request_gpio(gpiod_line*, bool) { return -1; }
 
-void WireKernel::release_gpio(gpiod_line* line) { ::gpiod_line_close_chip(line); }
+int WireKernel::set_gpio(gpiod_line*, int) { return -1; }
 
-WireKernel& system_wires() {
-  static WireKernel kernel;
-  return kernel;
-}
+void WireKernel::release_gpio(gpiod_line*) {}
+
+namespace {
+
+WireKernel modem_lines_only;
+WireKernel* all_wires = &modem_lines_only;
+
+}  // namespace
+
+WireKernel& system_wires() { return *all_wires; }
+
+void set_system_wires(WireKernel& kernel) { all_wires = &kernel; }
 
 PulseOutput::PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel)
     : wire_(std::move(wire)), descriptor_(descriptor), path_(std::move(path)), kernel_(&kernel) {
@@ -59,6 +65,10 @@ void PulseOutput::open_gpio() {
   line_ = kernel_->find_gpio(wire_.name);
   if (line_ == nullptr) {
     if (errno == EACCES || errno == EPERM) throw refused(errno);
+    if (errno == ENOSYS) {
+      throw Failure(Failure::Kind::unsupported,
+                    what + " cannot be used: this program was built without absenc::gpio; build it with that library");
+    }
     throw Failure(Failure::Kind::not_found,
                   "no GPIO line of this machine is named " + wire_.name + ": `gpioinfo` lists the names");
   }

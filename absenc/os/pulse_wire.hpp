@@ -26,7 +26,8 @@ struct PulseWires {
   PulseWire clear{};
 };
 
-/// The system calls of a PulseOutput, which tests override. A call that fails sets errno.
+/// The system calls of a PulseOutput, which tests override. A call that fails sets errno. Here only modem lines work;
+/// os/gpio adds the GPIO lines, so that programs without them need no libgpiod.
 struct WireKernel {
   virtual ~WireKernel() = default;
   /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
@@ -38,6 +39,8 @@ struct WireKernel {
   virtual void release_gpio(gpiod_line* line);
 };
 [[nodiscard]] WireKernel& system_wires();
+/// Replaces the result of `system_wires` by `kernel`, which must outlive all ports. Call it before threads are started.
+void set_system_wires(WireKernel& kernel);
 
 /// An opened wire for pulses. It is at rest (inactive) until `drive(true)` is called.
 class PulseOutput {

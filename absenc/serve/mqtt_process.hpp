@@ -10,7 +10,7 @@
 
 namespace absenc::serve {
 
-/// The internal verb of `absenc` that starts the MQTT client process.
+/// The internal verb of the program absenc-serve that starts the MQTT client process.
 inline constexpr std::string_view mqtt_process_verb = "serve-mqtt-client";
 
 /// Runs the MQTT client process. Returns the exit status for `main`.

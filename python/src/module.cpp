@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The extension module absenc._absenc, which absenc/*.py is based on.
+#include "absenc/client/configuration.hpp"  // names of absenc.toml
 #include "python/src/bind.hpp"
+#ifdef ABSENC_GPIO
+#include "absenc/os/gpio.hpp"  // ports may use GPIO lines
+#endif
+#ifdef ABSENC_HDF5
+#include "absenc/client/hdf5.hpp"  // recordings may be HDF5
+#endif
 
 PYBIND11_MODULE(_absenc, module) {
   using namespace absenc::python;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
 namespace absenc::tool {
 
@@ -46,17 +45,13 @@ std::string parameter_lines(std::span<const Parameter> parameters, bool options)
   return text;
 }
 
+}  // namespace
+
 std::string example_lines(std::span<const Example> examples) {
   std::string text;
   for (const Example& example : examples) text += fmt::format("  {}\n      {}\n", example.command, example.meaning);
   return text;
 }
-
-std::string verb_line(const Subcommand& subcommand) {
-  return fmt::format("  {:<17}{}\n", subcommand.name, subcommand.summary);
-}
-
-}  // namespace
 
 std::string title(const Parameter& parameter) {
   if (!parameter.is_option()) return fmt::format("<{}>{}", parameter.name, parameter.repeatable ? "..." : "");
@@ -90,34 +85,6 @@ std::string help(const Subcommand& subcommand) {
   text +=
       fmt::format("\nOptions:\n{}{:<24}{}\n", parameter_lines(subcommand.parameters, true), "  --help", "this text");
   return text + fmt::format("\nExamples:\n{}", example_lines(subcommand.examples));
-}
-
-std::string help(std::string_view group) {
-  std::string text = fmt::format("Usage: absenc {} <verb> ...\n\nVerbs:\n", group);
-  for (const Subcommand* subcommand : all_subcommands()) {
-    if (first_word(*subcommand) == group) text += verb_line(*subcommand);
-  }
-  return text + fmt::format("\n`absenc {} <verb> --help` explains a verb.\n", group);
-}
-
-std::string help() {
-  std::string text = fmt::format("absenc: {}\n\nUsage: absenc <verb> ...\n\nVerbs:\n", about);
-  std::string_view group;
-  for (const Subcommand* subcommand : all_subcommands()) {
-    if (group != std::exchange(group, first_word(*subcommand))) text += '\n';
-    text += verb_line(*subcommand);
-  }
-  text += "\nAn encoder is its protocol and where it is connected:\n";
-  for (const Example& encoder : encoder_examples) {
-    text += fmt::format("  {:<32}{}\n", encoder.command, encoder.meaning);
-  }
-  text += "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
-  text += fmt::format("\nExamples:\n{}", example_lines(general_examples));
-  text += "\n`absenc <verb> --help` explains a verb, `absenc --version` prints the version.\n";
-  text += "Exit status:";
-  for (std::size_t i = 0; i < exit_statuses.size(); ++i)
-    text += fmt::format("{} {} {}", i == 0 ? "" : ",", i, exit_statuses[i]);
-  return text + ".\n";
 }
 
 }  // namespace absenc::tool

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -53,6 +54,9 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 [[nodiscard]] std::string help(const Subcommand& subcommand);
 /// Returns the help text of all verbs of two words that begin with `first_word_of_two`, such as "memory".
 [[nodiscard]] std::string help(std::string_view first_word_of_two);
+
+/// Returns the examples as help lists them, one below the other.
+[[nodiscard]] std::string example_lines(std::span<const Example> examples);
 
 /// Returns the usage line of a verb: "absenc read <encoder> [options]".
 [[nodiscard]] std::string usage(const Subcommand& subcommand);

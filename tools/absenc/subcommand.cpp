@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <optional>
 
 #include "absenc/client/text/real_number.hpp"
@@ -11,48 +10,6 @@
 #include "tools/absenc/error.hpp"
 
 namespace absenc::tool {
-
-std::span<const Subcommand* const> all_subcommands() {
-  static constexpr std::array all{
-      &ports_subcommand,
-      &list_subcommand,
-      &read_subcommand,
-      &monitor_subcommand,
-      &serve_subcommand,
-      &record_subcommand,
-      &info_subcommand,
-      &alarms_subcommand,
-      &temperature_subcommand,
-      &zero_subcommand,
-      &reset_multiturn_subcommand,
-      &clear_alarms_subcommand,
-      &memory_read_subcommand,
-      &memory_write_subcommand,
-      &memory_dump_subcommand,
-      &memory_load_subcommand,
-      &memory_verify_subcommand,
-      &config_get_subcommand,
-      &config_set_subcommand,
-      &changes_subcommand,
-      &run_subcommand,
-      &scan_subcommand,
-      &emulate_subcommand,
-      &tap_subcommand,
-      &decode_subcommand,
-      &encode_subcommand,
-      &wave_subcommand,
-      &probe_subcommand,
-      &identify_subcommand,
-      &doctor_subcommand,
-      &conform_subcommand,
-      &conform_host_subcommand,
-      &crc_find_subcommand,
-      &vectors_subcommand,
-      &campaign_subcommand,
-      &bench_subcommand,
-  };
-  return all;
-}
 
 std::string_view first_word(const Subcommand& subcommand) {
   const std::size_t space = subcommand.name.find(' ');
@@ -62,17 +19,6 @@ std::string_view first_word(const Subcommand& subcommand) {
 std::string_view last_word(const Subcommand& subcommand) {
   // In a name without a blank `find` returns npos, and npos + 1 is 0, so the whole name is returned.
   return subcommand.name.substr(subcommand.name.find(' ') + 1);
-}
-
-std::vector<std::string_view> words_after(std::string_view first) {
-  std::vector<std::string_view> words;
-  for (const Subcommand* subcommand : all_subcommands()) {
-    const std::string_view group = first_word(*subcommand);
-    const std::string_view word = first.empty() && !group.empty() ? group : last_word(*subcommand);
-    const bool belongs = first.empty() || group == first;
-    if (belongs && (words.empty() || words.back() != word)) words.push_back(word);
-  }
-  return words;
 }
 
 std::string_view Invocation::text(std::string_view name, std::string_view fallback) const {

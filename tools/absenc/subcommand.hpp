@@ -53,6 +53,9 @@ struct Subcommand {
   std::span<const Parameter> parameters;
   std::span<const Example> examples;
   int (*run)(const Invocation& invocation);  // runs the verb and returns the exit status
+  // name of the program that runs the verb in place of the command; "": the command runs it
+  std::string_view program{};
+  std::string_view package{};  // Debian package that has this program
 };
 
 /// All subcommands in the order of help; those with the same first word are adjacent.

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/capture/annotate/drawing.hpp"
 
-#include <zip.h>
-
 #include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
-#include <exception>
 #include <limits>
-#include <memory>
 #include <ostream>
+#include <span>
 #include <stdexcept>
+#include <vector>
+
+#include "absenc/capture/files/zip_writer.hpp"
 
 namespace absenc::capture {
 
@@ -97,7 +97,7 @@ std::string seconds(Tick time) {
   return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
 }
 
-/// The samples of a drawing, computed when libzip requests them.
+/// The samples of a drawing, computed piece by piece.
 class Samples {
  public:
   Samples(Drawing& drawing, std::uint64_t rate)
@@ -128,7 +128,6 @@ class Samples {
 
   const std::size_t size;  // size of a sample in bytes
   const std::uint64_t count;
-  std::exception_ptr exception{};  // exception that ended the computation of samples; null: none
 
  private:
   // Returns the index of the first sample that is not before `time`.
@@ -156,62 +155,6 @@ class Samples {
   std::uint64_t changes_at_ = 0;
   std::uint8_t packed_[8]{};
 };
-
-/// One part of the samples, which is one file in the sigrok archive.
-struct SamplesPart {
-  Samples* samples;
-  std::uint64_t size;  // number of bytes in this part of the samples
-  std::uint64_t given = 0;
-};
-
-// Reads the bytes of a file in the archive: a callback of libzip.
-zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
-  SamplesPart& part = *static_cast<SamplesPart*>(state);
-  switch (command) {
-    case ZIP_SOURCE_OPEN:
-    case ZIP_SOURCE_CLOSE:
-    case ZIP_SOURCE_FREE:
-      return 0;
-    case ZIP_SOURCE_READ: {
-      const std::uint64_t room = std::min<std::uint64_t>(size, part.size - part.given);
-      try {
-        const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
-        part.given += filled;
-        return static_cast<zip_int64_t>(filled);
-      } catch (...) {  // libzip is written in C, so no exception may pass through it
-        part.samples->exception = std::current_exception();
-        return -1;
-      }
-    }
-    case ZIP_SOURCE_STAT: {
-      auto* const stat = static_cast<zip_stat_t*>(data);
-      zip_stat_init(stat);
-      stat->size = part.size;
-      stat->valid = ZIP_STAT_SIZE;
-      return sizeof(*stat);
-    }
-    case ZIP_SOURCE_SUPPORTS:
-      return zip_source_make_command_bitmap(ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE, ZIP_SOURCE_STAT,
-                                            ZIP_SOURCE_FREE, -1);
-    default:
-      return -1;
-  }
-}
-
-struct Discard {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-};
-using Archive = std::unique_ptr<zip_t, Discard>;
-
-[[noreturn]] void fail(const std::string& path, const char* why) {
-  throw std::runtime_error(path + " cannot be written: " + why);
-}
-
-void add(zip_t* archive, const std::string& path, const char* name, zip_source_t* source) {
-  if (source != nullptr && zip_file_add(archive, name, source, ZIP_FL_OVERWRITE) >= 0) return;
-  if (source != nullptr) zip_source_free(source);
-  fail(path, zip_strerror(archive));
-}
 
 std::string metadata(Drawing& drawing, std::uint64_t rate, std::size_t unit_size) {
   std::string text = "[global]\nsigrok version=0.5.2\n\n[device 1]\ncapturefile=logic-1\ntotal probes=" +
@@ -311,34 +254,24 @@ void write_saleae_csv(std::ostream& out, Drawing& drawing) {
 }
 
 void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate) {
-  int code = 0;
-  Archive archive(zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code));
-  if (archive == nullptr) {
-    zip_error_t error;
-    zip_error_init_with_code(&error, code);
-    const std::string why = zip_error_strerror(&error);
-    zip_error_fini(&error);
-    fail(path, why.c_str());
-  }
+  ZipWriter archive(path);
   Samples samples(drawing, rate);
-  const std::string about = metadata(drawing, rate, samples.size);
-  add(archive.get(), path, "version", zip_source_buffer(archive.get(), "2", 1, 0));
-  add(archive.get(), path, "metadata", zip_source_buffer(archive.get(), about.data(), about.size(), 0));
+  archive.add("version", "2");
+  archive.add("metadata", metadata(drawing, rate, samples.size));
 
   constexpr std::uint64_t samples_a_part = 4 << 20;
-  std::vector<std::unique_ptr<SamplesPart>> parts;
+  std::vector<std::uint8_t> bytes(1 << 16);  // a multiple of each size of a sample
+  unsigned part = 0;
   for (std::uint64_t first = 0; first < samples.count; first += samples_a_part) {
-    const std::uint64_t size = std::min(samples_a_part, samples.count - first) * samples.size;
-    parts.push_back(std::make_unique<SamplesPart>(SamplesPart{&samples, size}));
-    add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
-        zip_source_function(archive.get(), provide, parts.back().get()));
+    archive.begin("logic-1-" + std::to_string(++part));
+    for (std::uint64_t left = std::min(samples_a_part, samples.count - first) * samples.size; left != 0;) {
+      const std::size_t filled =
+          samples.fill(bytes.data(), static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), left)));
+      archive.write(std::span(bytes).first(filled));
+      left -= filled;
+    }
   }
-  // zip_close reads the parts in the order in which they were added, as Samples requires.
-  if (zip_close(archive.get()) != 0) {
-    if (samples.exception != nullptr) std::rethrow_exception(samples.exception);
-    fail(path, zip_strerror(archive.get()));
-  }
-  static_cast<void>(archive.release());
+  archive.finish();
 }
 
 }  // namespace absenc::capture

@@ -8,27 +8,18 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/capture/files/zip_format.hpp"
 #include "absenc/core/bits.hpp"
 
 namespace absenc::capture {
 
+using namespace zip;
+
 namespace {
 
-// These numbers are from PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.4.9 and 4.5.3, except `largest_directory`.
-constexpr std::uint64_t local_signature = 0x04034B50;
-constexpr std::uint64_t directory_signature = 0x02014B50;
-constexpr std::uint64_t zip64_end_signature = 0x06064B50;
-constexpr std::uint64_t zip64_locator_signature = 0x07064B50;
-constexpr std::uint64_t end_signature = 0x06054B50;
-constexpr std::size_t local_bytes = 30;
-constexpr std::uint64_t size_behind = 1 << 3;   // flag of an entry whose sizes are stored after its data
-constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size field if the real size is in the zip64 extra field
+constexpr std::uint64_t size_behind = 1 << 3;  // flag of an entry whose sizes are stored after its data
 constexpr std::uint64_t zip64_version = 45;
 constexpr std::size_t largest_directory = 1 << 26;
-
-std::uint64_t number(Bytes bytes, std::size_t at, std::size_t size) {
-  return load_little_endian(bytes.subspan(at, size));
-}
 
 struct Directory {
   std::vector<std::uint8_t> bytes;

@@ -193,7 +193,7 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     EXPECT_TRUE(read_in_threads(*reader) == expected);
     ASSERT_EQ(reader->damages().size(), 1u);
     EXPECT_EQ(reader->damages()[0].tick, 6u << 16);
-    EXPECT_EQ(reader->damages()[0].what, "logic-1-7, which ends at sample 458752, is damaged: CRC error");
+    EXPECT_EQ(reader->damages()[0].what, "logic-1-7, which ends at sample 458752, is damaged: its checksum is wrong");
   }
 }
 

@@ -1,99 +1,126 @@
 // SPDX-License-Identifier: Apache-2.0
+// Reads zip archives as far as they are intact: minizip refuses an entry whose local header and directory differ, as
+// they do in an archive that was cut off, and libzip loads GnuTLS. The numbers are from PKWARE's APPNOTE 6.3.10, 4.3.
 #include "absenc/capture/files/zip_archive.hpp"
 
 #include <libdeflate.h>
-#include <zip.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cstring>
-#include <memory>
+#include <optional>
 #include <utility>
-#include <vector>
+
+#include "absenc/capture/files/zip_format.hpp"
 
 namespace absenc::capture {
 
+using namespace zip;
+
 namespace {
 
-// The source in the form that libzip reads, with a buffer that saves system calls.
-struct Window {
-  Source* source = nullptr;
-  std::uint64_t position = 0;
-  std::uint64_t buffered_at = 0;
-  std::size_t buffered = 0;
-  std::array<std::uint8_t, 1 << 16> buffer{};
-  bool mark = false;  // true: the next read of the source is the first one for an entry
-  std::uint64_t entry = 0;
-  zip_error_t error{};
+constexpr std::size_t directory_bytes = 46;
+constexpr std::size_t zip64_end_bytes = 56;
+constexpr std::size_t zip64_locator_bytes = 20;
+constexpr std::size_t end_bytes = 22;
+constexpr std::size_t longest_comment = 0xFFFF;
+constexpr std::uint64_t stored = 0;
+constexpr std::uint64_t deflated = 8;
+constexpr std::uint64_t is_encrypted = 1;       // flag of an entry
+constexpr std::size_t longest_piece = 1 << 28;  // of the directory, in bytes
 
-  std::size_t read(std::uint8_t* into, std::size_t size) {
-    if (std::exchange(mark, false)) entry = position;
-    std::size_t done = 0;
-    while (done < size) {
-      if (position < buffered_at || position >= buffered_at + buffered) {
-        buffered_at = position;
-        buffered = source->read(position, buffer);
-        if (buffered == 0) break;
-      }
-      const auto from = static_cast<std::size_t>(position - buffered_at);
-      const std::size_t count = std::min(size - done, buffered - from);
-      std::memcpy(into + done, buffer.data() + from, count);
-      done += count;
-      position += count;
-    }
-    return done;
-  }
-
-  zip_int64_t seek(void* data, zip_uint64_t length) {
-    const zip_int64_t to = zip_source_seek_compute_offset(position, source->size(), data, length, &error);
-    if (to < 0) return -1;
-    position = static_cast<std::uint64_t>(to);
-    return 0;
-  }
-
-  zip_int64_t status(void* data, zip_uint64_t length) {
-    if (length < sizeof(zip_stat_t)) return -1;
-    auto* stat = static_cast<zip_stat_t*>(data);
-    zip_stat_init(stat);
-    stat->size = source->size();
-    stat->valid |= ZIP_STAT_SIZE;
-    return sizeof(zip_stat_t);
-  }
+struct DirectoryEntry {
+  std::string name;
+  std::uint64_t flags = 0;
+  std::uint64_t method = 0;
+  std::uint64_t crc = 0;
+  std::uint64_t packed = 0;
+  std::uint64_t size = 0;
+  std::uint64_t at = 0;  // offset of the local header
 };
 
-zip_int64_t answer(void* user, void* data, zip_uint64_t length, zip_source_cmd_t command) {
-  auto& window = *static_cast<Window*>(user);
-  switch (command) {
-    case ZIP_SOURCE_OPEN:
-      window.position = 0;
-      return 0;
-    case ZIP_SOURCE_READ:
-      return static_cast<zip_int64_t>(window.read(static_cast<std::uint8_t*>(data), static_cast<std::size_t>(length)));
-    case ZIP_SOURCE_CLOSE:
-    case ZIP_SOURCE_FREE:
-      return 0;
-    case ZIP_SOURCE_STAT:
-      return window.status(data, length);
-    case ZIP_SOURCE_ERROR:
-      return zip_error_to_data(&window.error, data, length);
-    case ZIP_SOURCE_SEEK:
-      return window.seek(data, length);
-    case ZIP_SOURCE_TELL:
-      return static_cast<zip_int64_t>(window.position);
-    case ZIP_SOURCE_SUPPORTS:
-      return zip_source_make_command_bitmap(ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE, ZIP_SOURCE_STAT,
-                                            ZIP_SOURCE_ERROR, ZIP_SOURCE_FREE, ZIP_SOURCE_SEEK, ZIP_SOURCE_TELL,
-                                            ZIP_SOURCE_SUPPORTS, -1);
-    default:
-      zip_error_set(&window.error, ZIP_ER_OPNOTSUPP, 0);
-      return -1;
+// Replaces fields of the entry that are in the zip64 extra field, in their order.
+void take_zip64(DirectoryEntry& entry, Bytes extra) {
+  while (extra.size() >= 4) {
+    const std::size_t length = std::min<std::size_t>(4 + number(extra, 2, 2), extra.size());
+    if (number(extra, 0, 2) == 1) {
+      Bytes values = extra.subspan(4, length - 4);
+      for (std::uint64_t* field : {&entry.size, &entry.packed, &entry.at}) {
+        if (*field != in_zip64 || values.size() < 8) continue;
+        *field = number(values, 0, 8);
+        values = values.subspan(8);
+      }
+      return;
+    }
+    extra = extra.subspan(length);
   }
 }
 
-struct Close {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-  void operator()(zip_file_t* file) const { zip_fclose(file); }
+// Returns `size` bytes of the source from `at` on; nothing if they are not there.
+std::optional<std::vector<std::uint8_t>> bytes_at(Source& source, std::uint64_t at, std::uint64_t size) {
+  if (at > source.size() || size > source.size() - at || size > longest_piece) return std::nullopt;
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(size));
+  if (source.read(at, bytes) != bytes.size()) return std::nullopt;
+  return bytes;
+}
+
+struct Place {
+  std::uint64_t at = 0;
+  std::uint64_t size = 0;
+};
+
+// Finds the directory by the record at the end of the file, behind which only a comment may be.
+std::optional<Place> find_directory(Source& source) {
+  const std::uint64_t tail_size = std::min<std::uint64_t>(source.size(), end_bytes + longest_comment);
+  const std::uint64_t tail_at = source.size() - tail_size;
+  const auto tail = bytes_at(source, tail_at, tail_size);
+  if (!tail || tail->size() < end_bytes) return std::nullopt;
+  for (std::size_t i = tail->size() - end_bytes + 1; i-- > 0;) {
+    if (number(*tail, i, 4) != end_signature || i + end_bytes + number(*tail, i + 20, 2) > tail->size()) continue;
+    const Place place{number(*tail, i + 16, 4), number(*tail, i + 12, 4)};
+    const std::uint64_t end_at = tail_at + i;
+    if (place.at != in_zip64 && place.size != in_zip64 && place.at + place.size <= end_at) return place;
+    if (end_at < zip64_locator_bytes) continue;
+    const auto locator = bytes_at(source, end_at - zip64_locator_bytes, zip64_locator_bytes);
+    if (!locator || number(*locator, 0, 4) != zip64_locator_signature) continue;
+    const auto end = bytes_at(source, number(*locator, 8, 8), zip64_end_bytes);
+    if (end && number(*end, 0, 4) == zip64_end_signature) return Place{number(*end, 48, 8), number(*end, 40, 8)};
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<DirectoryEntry>> read_directory(Source& source) {
+  const std::optional<Place> place = find_directory(source);
+  const auto bytes = place ? bytes_at(source, place->at, place->size) : std::nullopt;
+  if (!bytes) return std::nullopt;
+  std::vector<DirectoryEntry> entries;
+  for (Bytes left = *bytes; left.size() >= directory_bytes;) {
+    const auto name = static_cast<std::size_t>(number(left, 28, 2));
+    const auto extra = static_cast<std::size_t>(number(left, 30, 2));
+    const std::size_t length = directory_bytes + name + extra + static_cast<std::size_t>(number(left, 32, 2));
+    if (number(left, 0, 4) != directory_signature || length > left.size()) return std::nullopt;
+    DirectoryEntry entry{.name = {},
+                         .flags = number(left, 8, 2),
+                         .method = number(left, 10, 2),
+                         .crc = number(left, 16, 4),
+                         .packed = number(left, 20, 4),
+                         .size = number(left, 24, 4),
+                         .at = number(left, 42, 4)};
+    const Bytes text = left.subspan(directory_bytes, name);
+    entry.name.assign(text.begin(), text.end());
+    take_zip64(entry, left.subspan(directory_bytes + name, extra));
+    entries.push_back(std::move(entry));
+    left = left.subspan(length);
+  }
+  return entries;
+}
+
+struct Free {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
+  void operator()(z_stream* stream) const {
+    inflateEnd(stream);
+    delete stream;
+  }
 };
 
 // Returns a limit for the compressed size: deflate adds only few bytes to data that cannot be compressed.
@@ -102,105 +129,159 @@ constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 
 }  // namespace
 
 struct ZipArchive::State {
-  Window window;
-  std::unique_ptr<zip_t, Close> archive;
-  std::unique_ptr<zip_file_t, Close> file;  // handle of the entry that is read; must be closed before its archive
-  std::unique_ptr<libdeflate_decompressor, Close> inflater;
+  Source* source = nullptr;
+  std::vector<DirectoryEntry> entries;
+  std::unique_ptr<libdeflate_decompressor, Free> inflater;
   std::vector<std::uint8_t> packed;
   std::string problem;
   bool ran_out = false;
 
-  std::span<std::uint8_t> room(std::size_t size) {
-    if (packed.size() < size) packed.resize(size);
-    return std::span(packed).first(size);
+  // the entry that is being read
+  const DirectoryEntry* entry = nullptr;
+  std::unique_ptr<z_stream, Free> stream;  // null: the entry is stored
+  std::array<std::uint8_t, 1 << 16> buffer{};
+  std::uint64_t next = 0;  // offset in the file of the bytes that were not taken into `buffer` yet
+  std::uint64_t left = 0;  // number of these bytes
+  std::uint64_t given = 0;
+  std::uint32_t crc = 0;
+  bool ended = false;  // whether all data of the entry was expanded
+
+  // Returns the offset of the entry's data; nothing if its local header is damaged.
+  [[nodiscard]] std::optional<std::uint64_t> data_of(const DirectoryEntry& one) const {
+    const auto header = bytes_at(*source, one.at, local_bytes);
+    if (!header || number(*header, 0, 4) != local_signature) return std::nullopt;
+    return one.at + local_bytes + number(*header, 26, 2) + number(*header, 28, 2);
   }
+
   // Expands a deflated entry. Returns true if the data fills `into` exactly.
-  bool inflate(std::span<const std::uint8_t> from, std::span<std::uint8_t> into) {
+  bool inflate_whole(std::span<const std::uint8_t> from, std::span<std::uint8_t> into) {
     if (inflater == nullptr) inflater.reset(libdeflate_alloc_decompressor());
     return inflater != nullptr && libdeflate_deflate_decompress(inflater.get(), from.data(), from.size(), into.data(),
                                                                 into.size(), nullptr) == LIBDEFLATE_SUCCESS;
   }
+
+  // Reads the next packed bytes into `into`; returns their number, 0 at the end of the entry or of the file.
+  std::size_t take(std::span<std::uint8_t> into) {
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(into.size(), left));
+    const std::size_t got = source->read(next, into.first(wanted));
+    next += got;
+    left -= got;
+    return got;
+  }
+
+  // Expands the next bytes of the entry; returns their number, 0 at its end or on error, which sets `problem`.
+  std::size_t expand_some(std::span<std::uint8_t> into) {
+    if (stream == nullptr) {
+      const std::size_t got = take(into);
+      ended = left == 0;
+      if (got == 0 && !ended) problem = "it ends early";
+      return got;
+    }
+    stream->next_out = into.data();
+    stream->avail_out = static_cast<unsigned>(std::min<std::size_t>(into.size(), 1 << 30));
+    const unsigned room = stream->avail_out;
+    while (!ended && stream->avail_out == room) {
+      if (stream->avail_in == 0) {
+        stream->next_in = buffer.data();
+        stream->avail_in = static_cast<unsigned>(take(buffer));
+      }
+      if (stream->avail_in == 0) {
+        problem = "it ends early";
+        ran_out = true;
+        break;
+      }
+      const int status = ::inflate(stream.get(), Z_NO_FLUSH);
+      ended = status == Z_STREAM_END;
+      if (status != Z_OK && !ended) {
+        problem = stream->msg != nullptr ? stream->msg : "its compressed data is damaged";
+        break;
+      }
+    }
+    return room - stream->avail_out;
+  }
 };
 
 ZipArchive::ZipArchive(Source& source) : state_(std::make_unique<State>()) {
-  state_->window.source = &source;
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_error_init(&state_->window.error);
-  zip_source_t* from = zip_source_function_create(&answer, &state_->window, &error);
-  if (from != nullptr) state_->archive.reset(zip_open_from_source(from, ZIP_RDONLY, &error));
-  if (state_->archive == nullptr) {
-    const std::string why = zip_error_strerror(&error);
-    zip_source_free(from);
-    zip_error_fini(&error);
-    throw OpenError(why);
-  }
-  zip_error_fini(&error);
+  state_->source = &source;
+  std::optional<std::vector<DirectoryEntry>> entries = read_directory(source);
+  if (!entries) throw OpenError("it has no intact directory");
+  state_->entries = *std::move(entries);
 }
 
-ZipArchive::~ZipArchive() {
-  state_->file.reset();
-  state_->archive.reset();
-  zip_error_fini(&state_->window.error);
-}
+ZipArchive::~ZipArchive() = default;
 
 bool ZipArchive::find(const std::string& name, Entry& entry) const {
-  const zip_int64_t index = zip_name_locate(state_->archive.get(), name.c_str(), ZIP_FL_ENC_GUESS);
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  if (index < 0 || zip_stat_index(state_->archive.get(), static_cast<zip_uint64_t>(index), 0, &stat) != 0) return false;
-  entry = {static_cast<std::uint64_t>(index), (stat.valid & ZIP_STAT_SIZE) != 0 ? stat.size : 0};
+  const auto found = std::find_if(state_->entries.begin(), state_->entries.end(),
+                                  [&](const DirectoryEntry& one) { return one.name == name; });
+  if (found == state_->entries.end()) return false;
+  entry = {static_cast<std::uint64_t>(found - state_->entries.begin()), found->size};
   return true;
 }
 
 std::vector<std::string> ZipArchive::names() const {
   std::vector<std::string> names;
-  const zip_int64_t count = zip_get_num_entries(state_->archive.get(), 0);
-  for (zip_int64_t i = 0; i < count; ++i) {
-    const char* name = zip_get_name(state_->archive.get(), static_cast<zip_uint64_t>(i), ZIP_FL_ENC_GUESS);
-    if (name != nullptr) names.emplace_back(name);
-  }
+  for (const DirectoryEntry& one : state_->entries) names.push_back(one.name);
   return names;
 }
 
 bool ZipArchive::expand(const Entry& entry, std::span<std::uint8_t> into) {
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  constexpr zip_uint64_t needed =
-      ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_CRC | ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
-  const bool known =
-      zip_stat_index(state_->archive.get(), entry.index, 0, &stat) == 0 && (stat.valid & needed) == needed;
-  if (!known || stat.comp_method != ZIP_CM_DEFLATE || stat.encryption_method != ZIP_EM_NONE) return false;
-  if (stat.size != into.size() || stat.comp_size > most_packed(into.size())) return false;
-  const std::span<std::uint8_t> packed = state_->room(static_cast<std::size_t>(stat.comp_size));
-  state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, ZIP_FL_COMPRESSED));
-  if (state_->file == nullptr || read(packed) != packed.size() || !state_->inflate(packed, into)) return false;
-  return libdeflate_crc32(0, into.data(), into.size()) == stat.crc;
+  const DirectoryEntry& one = state_->entries[static_cast<std::size_t>(entry.index)];
+  if (one.method != deflated || (one.flags & is_encrypted) != 0) return false;
+  if (one.size != into.size() || one.packed > most_packed(into.size())) return false;
+  const std::optional<std::uint64_t> data = state_->data_of(one);
+  if (!data) return false;
+  const auto size = static_cast<std::size_t>(one.packed);
+  if (state_->packed.size() < size) state_->packed.resize(size);
+  const std::span<std::uint8_t> packed = std::span(state_->packed).first(size);
+  if (state_->source->read(*data, packed) != size || !state_->inflate_whole(packed, into)) return false;
+  return libdeflate_crc32(0, into.data(), into.size()) == one.crc;
 }
 
 bool ZipArchive::open(const Entry& entry) {
-  state_->file.reset();
-  state_->ran_out = false;
-  state_->window.mark = true;
-  state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, 0));
-  if (state_->file != nullptr) return true;
-  state_->problem = zip_error_strerror(zip_get_error(state_->archive.get()));
-  return false;
+  State& state = *state_;
+  state.ran_out = false;
+  const DirectoryEntry& one = state.entries[static_cast<std::size_t>(entry.index)];
+  state.entry = &one;
+  const std::optional<std::uint64_t> data = state.data_of(one);
+  if (!data) {
+    state.problem = "its header is damaged";
+    return false;
+  }
+  if ((one.method != stored && one.method != deflated) || (one.flags & is_encrypted) != 0) {
+    state.problem = "it is encrypted or compressed by another method than deflate";
+    return false;
+  }
+  state.next = *data;
+  state.left = one.packed;
+  state.given = 0;
+  state.crc = 0;
+  state.ended = one.method == stored && one.packed == 0;
+  state.stream.reset();
+  if (one.method == deflated) {
+    state.stream.reset(new z_stream{});
+    constexpr int no_header = -MAX_WBITS;
+    if (inflateInit2(state.stream.get(), no_header) != Z_OK) {
+      state.problem = "there is too little memory";
+      return false;
+    }
+  }
+  return true;
 }
 
 std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
+  State& state = *state_;
   std::size_t done = 0;
-  state_->ran_out = false;
-  while (done < into.size()) {
-    const zip_int64_t got = zip_fread(state_->file.get(), into.data() + done, into.size() - done);
-    if (got <= 0) {
-      // At the end of an entry libzip checks the entry's checksum and size.
-      const int code = zip_error_code_zip(zip_file_get_error(state_->file.get()));
-      state_->ran_out = got == 0 || code == ZIP_ER_CRC || code == ZIP_ER_INCONS;
-      state_->problem = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));
-      break;
-    }
-    done += static_cast<std::size_t>(got);
+  state.ran_out = false;
+  while (done < into.size() && !state.ended) {
+    const std::size_t got = state.expand_some(into.subspan(done));
+    state.crc = libdeflate_crc32(state.crc, into.data() + done, got);
+    done += got;
+    if (got == 0 && !state.ended) return done;
+  }
+  state.given += done;
+  if (done < into.size()) {
+    state.ran_out = true;
+    state.problem = "it ends early";
   }
   return done;
 }
@@ -208,16 +289,26 @@ std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
 bool ZipArchive::ran_out() const { return state_->ran_out; }
 
 bool ZipArchive::at_good_end() {
-  std::uint8_t more = 0;
-  const zip_int64_t got = zip_fread(state_->file.get(), &more, 1);
-  if (got == 0) return true;
-  state_->problem =
-      got > 0 ? "it is longer than the archive says" : zip_error_strerror(zip_file_get_error(state_->file.get()));
+  State& state = *state_;
+  std::array<std::uint8_t, 1> more{};
+  while (!state.ended) {
+    const std::size_t got = state.expand_some(more);
+    if (got == 0 && !state.ended && !state.ran_out) return false;
+    if (got == 0) break;  // size and checksum decide also where only the mark at the end of the data is cut off
+    state.problem = "it is longer than the archive says";
+    return false;
+  }
+  if (state.given != state.entry->size) {
+    state.problem = "its size is not the one that the archive says";
+    return false;
+  }
+  if (state.crc == state.entry->crc) return true;
+  state.problem = "its checksum is wrong";
   return false;
 }
 
 std::string ZipArchive::problem() const { return state_->problem; }
 
-std::uint64_t ZipArchive::offset() const { return state_->window.entry; }
+std::uint64_t ZipArchive::offset() const { return state_->entry == nullptr ? 0 : state_->entry->at; }
 
 }  // namespace absenc::capture

@@ -44,7 +44,7 @@ class ZipArchive {
   /// Returns whether the entry that was read ends here, and its checksum is right.
   [[nodiscard]] bool at_good_end();
 
-  /// Returns a message about the last error of this archive, mostly libzip's.
+  /// Returns a message about the last error of this archive.
   [[nodiscard]] std::string problem() const;
   /// Returns the offset in the file of the entry that `open` opened last.
   [[nodiscard]] std::uint64_t offset() const;

@@ -68,7 +68,7 @@ TEST(ZipArchive, ReadingReportsDamage) {
     in_directory(file, checksum) ^= 1;
     Expanded result = expanded(file);
     EXPECT_FALSE(result.whole);
-    EXPECT_EQ(result.problem, "CRC error");
+    EXPECT_EQ(result.problem, "its checksum is wrong");
 
     file = good;
     file[200] ^= 0x10;  // damages one byte of the entry's data
@@ -84,13 +84,16 @@ TEST(ZipArchive, ReadingReportsDamage) {
   }
 }
 
-TEST(ZipArchive, ReadsOtherCompressionMethodsWithoutExpand) {
-  for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
-    if (zip_compression_method_supported(method, 1) == 0) continue;
-    const Expanded result = expanded(make_zip({{"entry", content}}, method));
-    EXPECT_FALSE(result.whole);
-    EXPECT_TRUE(result.found_by_reading);
-  }
+TEST(ZipArchive, ReadsStoredEntriesWithoutExpand) {
+  const Expanded result = expanded(make_zip({{"entry", content}}, false));
+  EXPECT_FALSE(result.whole);
+  EXPECT_TRUE(result.found_by_reading);
+}
+
+TEST(ZipArchive, RefusesUnknownCompression) {
+  const Expanded result = expanded(make_zip({{"entry", content}}, zip_int32_t{ZIP_CM_BZIP2}));
+  EXPECT_FALSE(result.whole || result.found_by_reading);
+  EXPECT_NE(result.problem, "");
 }
 
 TEST(ZipArchive, EntriesOfAnySizeOneAfterTheOther) {

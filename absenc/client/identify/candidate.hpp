@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/capture/search/hypotheses.hpp"
+#include "absenc/client/identify.hpp"
 #include "absenc/client/row.hpp"
 
 namespace absenc::client {
@@ -42,5 +43,8 @@ void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
 /// Returns the address of the candidate at the port `place`: "tformat:/dev/ttyUSB0?model=23-bit".
 [[nodiscard]] std::string address_of(const Candidate& candidate, std::string_view place);
+
+/// Returns the candidate as a result of `identify`; `place` is its port, "" for a capture.
+[[nodiscard]] FoundEncoder found_encoder(const Candidate& candidate, std::string_view place);
 
 }  // namespace absenc::client

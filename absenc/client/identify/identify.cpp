@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/client/identify.hpp"
 
-#include "absenc/client/error.hpp"
-#include "absenc/client/identify/capture.hpp"
 #include "absenc/client/identify/line.hpp"
 
 namespace absenc::client {
 
-namespace {
-
-FoundEncoder found(const Candidate& candidate, std::string_view place) {
+FoundEncoder found_encoder(const Candidate& candidate, std::string_view place) {
   const capture::Hypothesis& one = candidate.hypothesis;
   return {.unit = candidate.unit,
           .options = one.options,
@@ -24,8 +20,6 @@ FoundEncoder found(const Candidate& candidate, std::string_view place) {
           .identity = candidate.identity};
 }
 
-}  // namespace
-
 Identified identify(std::string_view place, const IdentifyChoices& choices) {
   LineSearch search = parse_search(place);
   search.limit = choices.limit;
@@ -33,18 +27,7 @@ Identified identify(std::string_view place, const IdentifyChoices& choices) {
   const LineFindings findings = search_line(search);
   if (findings.interrupted) throw os::Interrupted{};
   Identified all{.notes = findings.notes, .is_complete = !findings.out_of_time};
-  for (const Candidate& one : findings.candidates) all.found.push_back(found(one, search.place));
-  return all;
-}
-
-Identified identify_capture(const std::string& path, const DecodeChoices& choices) {
-  if (!choices.model.empty() || !choices.options.empty()) {
-    throw UsageError("the model and the options are what is searched for: they cannot be given");
-  }
-  const CaptureFindings findings = search_capture({path, choices}, [](const std::string&) {});
-  Identified all{.notes = findings.damages};
-  all.notes.insert(all.notes.end(), findings.refusals.begin(), findings.refusals.end());
-  for (const Candidate& one : findings.candidates) all.found.push_back(found(one, {}));
+  for (const Candidate& one : findings.candidates) all.found.push_back(found_encoder(one, search.place));
   return all;
 }
 

@@ -175,6 +175,9 @@ NamedEncoder NamedEncoders::require(std::string_view name) const {
 
 NamedEncoders require_names(std::string_view purpose) {
   if (std::optional<SettingsFile> config = load_settings_file()) return NamedEncoders(*std::move(config));
+  if (!reads_settings_file()) {
+    throw UsageError(fmt::format("{}, which this program does not read: build it with absenc::configuration", purpose));
+  }
   const std::string_view protocol = all_units()[0]->id;
   throw UsageError(
       fmt::format("{}, and there is none: looked for {}. An encoder is named there like this:\n"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads absenc.toml into data. Only settings_file.cpp includes toml++.
+// Reads absenc.toml into data.
 #pragma once
 
 #include <optional>
@@ -35,12 +35,16 @@ struct SettingsFile {
 };
 
 /// Parses the text of absenc.toml; `path` is its name in errors. Throws UsageError.
-[[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
+using SettingsParser = SettingsFile (*)(std::string_view text, const std::string& path);
+/// Sets the parser of this program. Call it before threads are started.
+void set_settings_parser(SettingsParser parser);
+/// Returns whether this program has a parser, so that it reads absenc.toml.
+[[nodiscard]] bool reads_settings_file();
 
 /// Returns the paths at which absenc.toml may be, in order of priority.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
-/// Reads the first file that exists; nothing: there is none. Throws UsageError.
+/// Reads the first file that exists; nothing: there is none, or this program does not read it. Throws UsageError.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

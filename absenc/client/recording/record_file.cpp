@@ -9,6 +9,14 @@
 
 namespace absenc::client {
 
+namespace {
+
+Hdf5FileMaker make_hdf5_file = nullptr;
+
+}  // namespace
+
+void set_hdf5_file_maker(Hdf5FileMaker maker) { make_hdf5_file = maker; }
+
 RecordForm record_form(const std::string& path) {
   const std::string ending = std::filesystem::path(path).extension();
   if (ending == ".csv") return RecordForm::csv;
@@ -23,7 +31,10 @@ RecordForm record_form(const std::string& path) {
 std::unique_ptr<RecordFile> make_record_file(const std::string& path, std::span<const Column> columns,
                                              const RecordHeader& header) {
   const RecordForm form = record_form(path);
-  return form == RecordForm::hdf5 ? make_hdf5_file(path, columns, header) : make_text_file(path, form, columns, header);
+  if (form != RecordForm::hdf5) return make_text_file(path, form, columns, header);
+  if (make_hdf5_file != nullptr) return make_hdf5_file(path, columns, header);
+  throw UsageError(fmt::format(
+      "this program cannot write {}: it was built without HDF5; choose a name that ends in .csv or .jsonl", path));
 }
 
 }  // namespace absenc::client

@@ -52,11 +52,14 @@ enum class RecordForm : std::uint8_t { csv, json_lines, hdf5 };
 [[nodiscard]] std::unique_ptr<RecordFile> make_record_file(const std::string& path, std::span<const Column> columns,
                                                            const RecordHeader& header);
 
-// The following functions create a file as `make_record_file` does, but each only in its own formats: CSV and JSON
-// lines, or HDF5.
+/// Creates a file as `make_record_file` does, but only as CSV or JSON lines.
 [[nodiscard]] std::unique_ptr<RecordFile> make_text_file(const std::string& path, RecordForm form,
                                                          std::span<const Column> columns, const RecordHeader& header);
-[[nodiscard]] std::unique_ptr<RecordFile> make_hdf5_file(const std::string& path, std::span<const Column> columns,
-                                                         const RecordHeader& header);
+
+/// Creates a file as `make_record_file` does, but only as HDF5.
+using Hdf5FileMaker = std::unique_ptr<RecordFile> (*)(const std::string& path, std::span<const Column> columns,
+                                                      const RecordHeader& header);
+/// Sets the maker of this program; without one HDF5 is refused. Call it before threads are started.
+void set_hdf5_file_maker(Hdf5FileMaker maker);
 
 }  // namespace absenc::client

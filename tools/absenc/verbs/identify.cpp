@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "absenc/client/identify/capture.hpp"
+#include "absenc/client/captures/identify_capture.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"

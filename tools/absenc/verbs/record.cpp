@@ -6,11 +6,13 @@
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/recording.hpp"
+#include "absenc/client/recording/record_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/parts.hpp"
 #include "tools/absenc/rate.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
@@ -96,6 +98,7 @@ int run_record(const Invocation& invocation) {
   const RecordingSettings settings = settings_of(invocation);
   Encoder live = open_encoder(uri, Pace(settings.rate_hz).period());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
+  if (record_form(settings.path) == RecordForm::hdf5) load_hdf5();
   Recording recording(settings, live);
   RecordingProgress report;
   bool good = false;

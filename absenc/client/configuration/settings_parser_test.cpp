@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 
+#include "absenc/client/configuration/settings_parser.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/port/named_encoder.hpp"
 

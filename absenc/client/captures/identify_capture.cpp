@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/client/identify/capture.hpp"
+#include "absenc/client/captures/identify_capture.hpp"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 
 #include "absenc/client/captures/words.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/identify.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -139,6 +140,17 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
   });
   rank(findings.candidates, searches);
   return findings;
+}
+
+Identified identify_capture(const std::string& path, const DecodeChoices& choices) {
+  if (!choices.model.empty() || !choices.options.empty()) {
+    throw UsageError("the model and the options are what is searched for: they cannot be given");
+  }
+  const CaptureFindings findings = search_capture({path, choices}, [](const std::string&) {});
+  Identified all{.notes = findings.damages};
+  all.notes.insert(all.notes.end(), findings.refusals.begin(), findings.refusals.end());
+  for (const Candidate& one : findings.candidates) all.found.push_back(found_encoder(one, {}));
+  return all;
 }
 
 }  // namespace absenc::client

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "absenc/client/recording/hdf5_store.hpp"
+#include "absenc/client/hdf5/hdf5_store.hpp"
 #include "absenc/client/row.hpp"
 
 namespace absenc::client {

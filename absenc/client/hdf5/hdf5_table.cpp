@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/client/recording/hdf5_table.hpp"
+#include "absenc/client/hdf5/hdf5_table.hpp"
 
 #include <algorithm>
 #include <limits>

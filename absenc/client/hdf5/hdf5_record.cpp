@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Records rows as HDF5, in a thread of its own.
+#include "absenc/client/hdf5/hdf5_record.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -8,8 +10,8 @@
 #include <thread>
 #include <utility>
 
-#include "absenc/client/recording/hdf5_table.hpp"
-#include "absenc/client/recording/record_file.hpp"
+#include "absenc/client/hdf5.hpp"
+#include "absenc/client/hdf5/hdf5_table.hpp"
 #include "absenc/os/line_file.hpp"
 
 namespace absenc::client {
@@ -156,6 +158,11 @@ class Hdf5Record final : public RecordFile {
 std::unique_ptr<RecordFile> make_hdf5_file(const std::string& path, std::span<const Column> columns,
                                            const RecordHeader& header) {
   return std::make_unique<Hdf5Record>(path, columns, header);
+}
+
+bool use_hdf5() {
+  set_hdf5_file_maker(&make_hdf5_file);
+  return true;
 }
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks that a file keeps its committed rows in a crash.
-#include "absenc/client/recording/hdf5_table.hpp"
+#include "absenc/client/hdf5/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
 

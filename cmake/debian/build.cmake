@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+# Applies Debian's policy to each package: compressed man pages, files "copyright" and "changelog", and folders that are
+# readable for all, independent of the umask. Each component has the name of its package.
+foreach(package IN LISTS CPACK_COMPONENTS_ALL)
+  set(root "${CPACK_TEMPORARY_DIRECTORY}/${package}/usr")
+  file(GLOB_RECURSE man_pages "${root}/share/man/*.[1-9]")
+  if(man_pages)
+    execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
+  endif()
+  set(documents "${root}/share/doc/${package}")
+  file(REMOVE "${documents}/LICENSE")  # the text of the licence is in /usr/share/common-licenses
+  file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
+       FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+  string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)  # SOURCE_DATE_EPOCH, if it is set
+  file(WRITE "${documents}/changelog"
+       "absenc (${CPACK_PACKAGE_VERSION}) stable; urgency=medium\n\n"
+       "  * CHANGELOG.md of the project says what changed.\n\n"
+       " -- ${CPACK_PACKAGE_CONTACT}  ${date}\n")
+  execute_process(COMMAND gzip -9nf "${documents}/changelog" COMMAND_ERROR_IS_FATAL ANY)
+  file(CHMOD "${documents}/changelog.gz" PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+  if(EXISTS "${CMAKE_CURRENT_LIST_DIR}/${package}.lintian-overrides")
+    file(COPY_FILE "${CMAKE_CURRENT_LIST_DIR}/${package}.lintian-overrides" "${CPACK_TEMPORARY_DIRECTORY}/overrides")
+    file(MAKE_DIRECTORY "${root}/share/lintian/overrides")
+    file(RENAME "${CPACK_TEMPORARY_DIRECTORY}/overrides" "${root}/share/lintian/overrides/${package}")
+    file(CHMOD "${root}/share/lintian/overrides/${package}" PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+  endif()
+  file(CHMOD_RECURSE "${root}" DIRECTORY_PERMISSIONS
+       OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+endforeach()

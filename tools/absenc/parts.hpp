@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Programs and plug-ins that belong to the command but may be installed later, each with the libraries that only it
+// needs.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool {
+
+/// The plug-in for recordings in HDF5, and the Debian package that has it.
+inline constexpr std::string_view hdf5_plugin = "hdf5.so";
+inline constexpr std::string_view hdf5_package = "absenc-hdf5";
+
+/// Returns the path at which the part `name` belongs: lib/absenc/NAME beside the folder of the command.
+[[nodiscard]] std::string path_of_part(std::string_view name);
+
+/// Replaces this process by the program of the verb, with the same words. Throws Failure if it is not installed.
+[[noreturn]] void start_program(const Subcommand& subcommand, std::span<char* const> words);
+
+/// Loads the plug-in for HDF5, so that recordings can be written with it. Throws Failure if it is not installed or of
+/// another version.
+void load_hdf5();
+
+}  // namespace absenc::tool
