@@ -18,6 +18,15 @@ if(NOT ABSENC_HAS_CXX20)
   message(FATAL_ERROR "absenc needs a compiler for C++20 (g++ 11, clang 14 or newer), which ${CMAKE_CXX_COMPILER} is not.")
 endif()
 
+# Sets `result` to the libraries of these names as the linker is to find them: with ABSENC_STATIC the static ones.
+function(absenc_linked result)
+  set(names ${ARGN})
+  if(ABSENC_STATIC)
+    list(TRANSFORM names REPLACE "^(.+)$" "-l:lib\\1.a")
+  endif()
+  set(${result} ${names} PARENT_SCOPE)
+endfunction()
+
 # Sets `result` to the names by which the linker finds these libraries, which CMake has as paths.
 function(absenc_plain_names result)
   set(names)

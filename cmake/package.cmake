@@ -6,6 +6,7 @@ set(CPACK_PACKAGE_CONTACT "absenc developers <absenc@localhost.invalid>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # empty, because each package has its own description
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
+set(CPACK_ABSENC_STRIP "${CMAKE_STRIP}")
 set(CPACK_PRE_BUILD_SCRIPTS "${PROJECT_SOURCE_DIR}/cmake/debian/build.cmake")
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
@@ -33,7 +34,7 @@ endif()
 if(TARGET absenc-serve)
   absenc_package(absenc-serve electronics "${PROJECT_DESCRIPTION} (server)"
     "Shows absolute encoders to many: a page, HTTP with JSON, history, MQTT and"
-    "Prometheus. The service starts as soon as /etc/absenc/absenc.toml lists encoders.")
+    "Prometheus. The service starts when /etc/absenc/absenc.toml lists encoders.")
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_DEPENDS "absenc ${same_version}, adduser")
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_BREAKS "absenc (<< 1.0.0)")
@@ -45,15 +46,15 @@ endif()
 
 if(TARGET absenc-hdf5-plugin)
   absenc_package(absenc-hdf5 electronics "${PROJECT_DESCRIPTION} (HDF5)"
-    "The plug-in by which the command absenc records readings in HDF5, the format that"
-    "h5py and MATLAB read.")
+    "The plug-in by which the command absenc records readings in HDF5, the format"
+    "that h5py and MATLAB read.")
   set(CPACK_DEBIAN_ABSENC-HDF5_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_ABSENC-HDF5_PACKAGE_DEPENDS "absenc ${same_version}")
 endif()
 
 absenc_package(libabsenc-dev libdevel "${PROJECT_DESCRIPTION} (development files)"
-  "One C++20 library for the absolute encoders of servo motors: read them, set them"
-  "up, emulate them, decode what was captured on their wires."
+  "One C++20 library for the absolute encoders of servo motors: read them, set"
+  "them up, emulate them, decode what was captured on their wires."
   "This package holds the static libraries with their headers, and the files for"
   "CMake and pkg-config.")
 if(TARGET absenc-client)
@@ -65,8 +66,8 @@ endif()
 if(TARGET absenc-python)
   math(EXPR python3_next_minor "${Python3_VERSION_MINOR} + 1")
   absenc_package(python3-absenc python "${PROJECT_DESCRIPTION} (Python)"
-    "Absolute encoders of servo motors where tests are written and data is looked at:"
-    "read them, emulate them in tests, decode captures into NumPy arrays.")
+    "Absolute encoders of servo motors where tests are written and data is looked"
+    "at: read them, emulate them in tests, decode captures into NumPy arrays.")
   set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_DEPENDS
       "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${python3_next_minor}), python3-numpy")

@@ -593,7 +593,7 @@ class Packages(unittest.TestCase):
         files = {name: {path for path in paths if not path.startswith("share/")} for name, paths in held.items()}
         self.assertEqual(files["absenc"], {"bin/absenc"})
         self.assertEqual(files["absenc-serve"], {"lib/absenc/absenc-serve", "lib/systemd/system/absenc.service"})
-        self.assertEqual(files["absenc-hdf5"], {"lib/absenc/hdf5.so"})
+        self.assertEqual(files["absenc-hdf5"], {"lib/absenc/plugins/hdf5.so"})
         self.assertTrue(SERVE_DOCUMENTS < held["absenc-serve"])
 
     def test_files_belong_to_root_and_are_readable(self):

@@ -7,6 +7,11 @@ foreach(package IN LISTS CPACK_COMPONENTS_ALL)
   if(man_pages)
     execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
   endif()
+  file(GLOB_RECURSE modules "${root}/lib/python3/*.so")  # CPack strips only what is a target
+  foreach(module IN LISTS modules)
+    execute_process(COMMAND "${CPACK_ABSENC_STRIP}" --strip-unneeded --remove-section=.comment "${module}"
+                    COMMAND_ERROR_IS_FATAL ANY)
+  endforeach()
   set(documents "${root}/share/doc/${package}")
   file(REMOVE "${documents}/LICENSE")  # the text of the licence is in /usr/share/common-licenses
   file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"

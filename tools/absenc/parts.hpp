@@ -12,7 +12,7 @@
 namespace absenc::tool {
 
 /// The plug-in for recordings in HDF5, and the Debian package that has it.
-inline constexpr std::string_view hdf5_plugin = "hdf5.so";
+inline constexpr std::string_view hdf5_plugin = "plugins/hdf5.so";
 inline constexpr std::string_view hdf5_package = "absenc-hdf5";
 
 /// Returns the path at which the part `name` belongs: lib/absenc/NAME beside the folder of the command.

@@ -1,0 +1,367 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""usage: release.py OUTPUT [--only amd64,arm64,armhf] [--jobs N]
+
+Builds everything that is published into the folder OUTPUT, which must not exist: Debian packages, static tarballs, wheels,
+the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/release-trees.
+The same commit gives the same bits: nothing in an artefact depends on folder, user or time.
+"""
+import argparse
+import gzip
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VERSION = (ROOT / "VERSION").read_text().strip()
+TREES = ROOT / "build/release-trees"
+sys.path.insert(0, str(ROOT / "packages/arduino"))
+sys.path.insert(0, str(ROOT / "python/backend"))
+
+# Licences of what is inside an artefact, by the Debian package that it comes from.
+LICENCES = {
+    "libc6-dev": "LGPL-2.1-or-later",
+    "libstdc++-12-dev": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "zlib1g-dev": "Zlib",
+    "libminizip-dev": "Zlib",
+    "libdeflate-dev": "MIT",
+    "libncurses-dev": "X11-distribute-modifications-variant",
+    "libgpiod-dev": "LGPL-2.1-or-later",
+    "libfmt-dev": "MIT",
+    "nlohmann-json3-dev": "MIT",
+    "libtomlplusplus-dev": "MIT",
+    "libhwy-dev": "Apache-2.0",
+    "pybind11-dev": "BSD-3-Clause",
+    "libjs-dygraphs": "MIT",
+}
+HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev"]  # compiled into every command
+STATIC = ["libstdc++-12-dev", "zlib1g-dev", "libminizip-dev", "libdeflate-dev", "libgpiod-dev"]
+
+
+@dataclass
+class Architecture:
+    """A machine for which programs are built, by Debian's name."""
+    name: str
+    tuple: str  # of the compiler
+    processor: str
+    emulator: str
+
+    @property
+    def native(self):
+        return self.processor == os.uname().machine
+
+
+ARCHITECTURES = {one.name: one for one in (
+    Architecture("amd64", "x86_64-linux-gnu", "x86_64", "qemu-x86_64-static"),
+    Architecture("arm64", "aarch64-linux-gnu", "aarch64", "qemu-aarch64-static"),
+    Architecture("armhf", "arm-linux-gnueabihf", "armv7l", "qemu-arm-static"),
+)}
+# The packages whose headers and libraries a cross-compiler needs.
+SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
+    libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
+    libmosquitto-dev libpython3.11-dev libjs-dygraphs""".split()
+
+
+def run(*command, **settings):
+    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, **settings)
+    if done.returncode != 0:
+        sys.exit(f"release: {' '.join(map(str, command))} failed:\n{done.stdout[-6000:]}")
+    return done.stdout
+
+
+def say(text):
+    print(f"release: {text}", flush=True)
+
+
+@dataclass
+class Release:
+    output: Path
+    jobs: int
+    commit: str
+    epoch: int
+    inside: dict = field(default_factory=dict)  # for each artefact, the Debian packages whose code it contains
+
+    def publish(self, path, packages=()):
+        shutil.copyfile(path, self.output / path.name)
+        self.inside[path.name] = list(packages)
+
+    # --- archives whose bits depend on nothing but their content ---
+
+    def write_tar(self, path, files):
+        """Writes {name: (bytes, mode)} as a .tar.gz."""
+        plain = io.BytesIO()
+        with tarfile.open(fileobj=plain, mode="w", format=tarfile.PAX_FORMAT) as archive:
+            for name in sorted(files):
+                content, mode = files[name]
+                info = tarfile.TarInfo(name)
+                info.size, info.mode, info.mtime = len(content), mode, self.epoch
+                archive.addfile(info, io.BytesIO(content))
+        path.write_bytes(gzip.compress(plain.getvalue(), 9, mtime=0))
+
+    def write_zip(self, path, files):
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name in sorted(files):
+                content, mode = files[name]
+                info = zipfile.ZipInfo(name)  # dated 1980-01-01
+                info.external_attr = (0o100000 | mode) << 16
+                info.compress_type = zipfile.ZIP_DEFLATED
+                archive.writestr(info, content)
+
+    # --- building ---
+
+    def tree(self, architecture, kind, *options):
+        """Configures a build tree and returns its path."""
+        path = TREES / f"{architecture.name}-{kind}"
+        options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG", "-DCMAKE_INSTALL_PREFIX=/usr",
+                   "-DABSENC_WERROR=ON", "-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF", "-DPython3_EXECUTABLE=/usr/bin/python3", *options]
+        if not architecture.native:
+            root = sysroot(architecture)
+            options += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/cross.cmake", f"-DABSENC_CROSS_TUPLE={architecture.tuple}",
+                        f"-DABSENC_CROSS_PROCESSOR={architecture.processor}", f"-DABSENC_CROSS_ROOT={root}",
+                        f"-DABSENC_CROSS_EMULATOR={architecture.emulator}",
+                        f"-DPython3_INCLUDE_DIR={root}/usr/include/python3.11",
+                        f"-DPYTHON_MODULE_EXTENSION=.cpython-311-{architecture.tuple}.so",
+                        f"-DHDF5_C_LIBRARIES={root}/usr/lib/{architecture.tuple}/libhdf5_serial.so",
+                        f"-DHDF5_C_INCLUDE_DIRS={root}/usr/include/hdf5/serial"]
+        run("cmake", "-S", ROOT, "-B", path, "-G", "Ninja", *options)
+        return path
+
+    def build(self, tree, *targets):
+        run("cmake", "--build", tree, "-j", self.jobs, "--target", *targets)
+
+    def debian_packages(self, architecture):
+        say(f"Debian packages for {architecture.name}")
+        tree = self.tree(architecture, "packages", f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
+        self.build(tree, "all")
+        with tempfile.TemporaryDirectory() as scratch:
+            run("cpack", "--config", tree / "CPackConfig.cmake", "-B", scratch)
+            for package in sorted(Path(scratch).glob("*.deb")):
+                inside = HEADERS + {"absenc-serve": ["libjs-dygraphs"], "python3-absenc": ["pybind11-dev"]}.get(
+                    package.name.split("_")[0], [])
+                self.publish(package, [] if package.name.startswith("libabsenc-dev") else inside)
+
+    def static_artefacts(self, architecture):
+        say(f"the tarball and the wheel for {architecture.name}")
+        tree = self.tree(architecture, "static", "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
+                         "-DABSENC_HDF5=OFF")
+        self.build(tree, "absenc-command", "absenc-manual", "absenc-python")
+        self.tarball(architecture, tree)
+        if architecture.name != "armhf":  # nobody else takes wheels for 32-bit ARM
+            self.wheel(architecture, tree)
+
+    def strip(self, architecture, path):
+        """Returns the program or module without its symbols."""
+        with tempfile.TemporaryDirectory() as scratch:
+            stripped = Path(scratch) / path.name
+            tool = "strip" if architecture.native else f"{architecture.tuple}-strip"
+            run(tool, "--strip-unneeded", "--remove-section=.comment", "-o", stripped, path)
+            return stripped.read_bytes()
+
+    def licences(self, packages):
+        """Returns the files of licences for these packages and for absenc itself."""
+        files = {"LICENSE": ((ROOT / "LICENSE").read_bytes(), 0o644)}
+        for package in packages:
+            files[f"licences/{package}"] = (Path(f"/usr/share/doc/{package}/copyright").read_bytes(), 0o644)
+        return files
+
+    def tarball(self, architecture, tree):
+        name = f"absenc-{VERSION}-linux-{architecture.processor.replace('armv7l', 'armv7')}"
+        inside = HEADERS + STATIC + ["libc6-dev", "libncurses-dev"]
+        files = {
+            "bin/absenc": (self.strip(architecture, tree / "bin/absenc"), 0o755),
+            "share/man/man1/absenc.1": ((tree / "manual/absenc.1").read_bytes(), 0o644),
+            "share/bash-completion/completions/absenc": ((tree / "manual/absenc").read_bytes(), 0o644),
+            "README": (TARBALL_README.format(version=VERSION, commit=self.commit).encode(), 0o644),
+            **self.licences(inside),
+        }
+        for page in sorted((tree / "manual").glob("*.7")):
+            files[f"share/man/man7/{page.name}"] = (page.read_bytes(), 0o644)
+        path = TREES / f"{name}.tar.gz"
+        self.write_tar(path, {f"{name}/{file}": content for file, content in files.items()})
+        self.publish(path, inside)
+
+    def wheel(self, architecture, tree):
+        import absenc_build
+        version = self.glibc_version(tree / "python/absenc", architecture)
+        tag = f"cp311-cp311-manylinux_2_{version}_{architecture.processor}"
+        package = {file.name: file.read_bytes() for file in sorted((tree / "python/absenc").iterdir()) if file.is_file()}
+        [module] = [file for file in (tree / "python/absenc").iterdir() if file.suffix == ".so"]
+        package[module.name] = self.strip(architecture, module)
+        inside = HEADERS + STATIC + ["pybind11-dev"]
+        licences = {f"licenses/{file}": content for file, (content, _) in self.licences(inside).items()}
+        path = TREES / f"absenc-{VERSION}-{tag}.whl"
+        absenc_build.write_wheel(path, package, tag, licences)
+        self.publish(path, inside)
+
+    def glibc_version(self, folder, architecture):
+        """Returns the least N so that glibc 2.N can load the module."""
+        [module] = folder.glob("*.so")
+        tool = "readelf" if architecture.native else f"{architecture.tuple}-readelf"
+        return max(int(minor) for minor in re.findall(r"GLIBC_2\.(\d+)", run(tool, "--version-info", module)))
+
+    # --- sources ---
+
+    def files_of_commit(self):
+        """Returns {path: (bytes, mode)} of all files of the commit."""
+        archive = subprocess.run(["git", "archive", "--format=tar", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
+        with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
+            return {info.name: (tar.extractfile(info).read(), 0o755 if info.mode & 0o100 else 0o644)
+                    for info in tar if info.isfile()}
+
+    def sources(self):
+        import absenc_build
+        say("the sources, and packages for firmware")
+        files = self.files_of_commit()
+        files["COMMIT"] = (f"{self.commit}\n".encode(), 0o644)
+        sdist = {f"absenc-{VERSION}/{name}": content for name, content in files.items()}
+        sdist[f"absenc-{VERSION}/PKG-INFO"] = (absenc_build.metadata().encode(), 0o644)
+        path = TREES / f"absenc-{VERSION}.tar.gz"
+        self.write_tar(path, sdist)
+        self.publish(path)
+        self.firmware(files)
+
+    def firmware(self, files):
+        layers = re.compile(r"absenc/(core|link|protocol|host)/")
+        tests = re.compile(r"(_test|_fuzz|_bench)\.[ch]pp$|/test_[^/]*$|/testing\.hpp$")
+        sources = {name: content for name, content in files.items() if layers.match(name) and not tests.search(name)}
+        common = {name: files[name] for name in ("LICENSE", "README.md")}
+
+        path = TREES / f"absenc-{VERSION}-platformio.tar.gz"  # pio pkg install --library FILE
+        self.write_tar(path, {**sources, **common, "library.json": files["library.json"]})
+        self.publish(path)
+
+        own = {name: files[name] for name in ("CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake", "idf_component.yml")}
+        path = TREES / f"absenc-{VERSION}-esp-idf.tar.gz"  # unpack into components/
+        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        self.publish(path)
+
+        own = {name: content for name, content in files.items() if name.startswith(("zephyr/", "packages/zephyr/"))}
+        own["cmake/sources.cmake"] = files["cmake/sources.cmake"]
+        path = TREES / f"absenc-{VERSION}-zephyr.tar.gz"  # unpack as a module: ZEPHYR_EXTRA_MODULES
+        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        self.publish(path)
+
+        import export
+        with tempfile.TemporaryDirectory() as scratch:
+            export.export(scratch)
+            arduino = {str(file.relative_to(scratch)): (file.read_bytes(), 0o644)
+                       for file in Path(scratch).rglob("*") if file.is_file()}
+        path = TREES / f"absenc-{VERSION}-arduino.zip"  # arduino-cli lib install --zip-path FILE
+        self.write_zip(path, arduino)
+        self.publish(path)
+
+    # --- lists ---
+
+    def lists(self):
+        (self.output / "absenc.spdx.json").write_text(json.dumps(self.spdx(), indent=1, sort_keys=True) + "\n")
+        used = sorted({package for packages in self.inside.values() for package in packages})
+        path = TREES / f"absenc-{VERSION}-licences.tar.gz"
+        self.write_tar(path, self.licences(used))
+        shutil.copyfile(path, self.output / path.name)
+        sums = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in sorted(self.output.iterdir()))
+        (self.output / "SHA256SUMS").write_text(sums)
+
+    def spdx(self):
+        """Returns the list of all artefacts and of the code of others in them, as SPDX 2.3."""
+        packages, relationships = [], []
+        for name in sorted({package for inside in self.inside.values() for package in inside}):
+            version = run("dpkg-query", "-W", "-f=${Version}", name)
+            packages.append({"SPDXID": identifier(name), "name": name, "versionInfo": version, "supplier": "Organization: Debian",
+                             "licenseConcluded": LICENCES[name], "licenseDeclared": LICENCES[name],
+                             "copyrightText": "NOASSERTION", "downloadLocation": f"https://packages.debian.org/bookworm/{name}"})
+        for artefact, inside in sorted(self.inside.items()):
+            digest = hashlib.sha256((self.output / artefact).read_bytes()).hexdigest()
+            packages.append({"SPDXID": identifier(artefact), "name": artefact, "versionInfo": VERSION,
+                             "licenseConcluded": "Apache-2.0", "licenseDeclared": "Apache-2.0", "copyrightText": "NOASSERTION",
+                             "downloadLocation": "NOASSERTION", "packageFileName": artefact,
+                             "checksums": [{"algorithm": "SHA256", "checksumValue": digest}]})
+            relationships.append({"spdxElementId": "SPDXRef-DOCUMENT", "relationshipType": "DESCRIBES",
+                                  "relatedSpdxElement": identifier(artefact)})
+            relationships += [{"spdxElementId": identifier(artefact), "relationshipType": "CONTAINS",
+                               "relatedSpdxElement": identifier(one)} for one in inside]
+        created = subprocess.run(["date", "-u", "-d", f"@{self.epoch}", "+%Y-%m-%dT%H:%M:%SZ"], check=True,
+                                 capture_output=True, text=True).stdout.strip()
+        return {"spdxVersion": "SPDX-2.3", "SPDXID": "SPDXRef-DOCUMENT", "dataLicense": "CC0-1.0", "name": f"absenc {VERSION}",
+                "documentNamespace": f"urn:absenc:{VERSION}:{self.commit}", "packages": packages, "relationships": relationships,
+                "creationInfo": {"created": created, "creators": ["Tool: absenc packages/release.py"]}}
+
+
+TARBALL_README = """\
+absenc {version} (commit {commit})
+
+Nothing needs to be installed: run bin/absenc. To have its man pages and completion,
+
+    export PATH="$PWD/bin:$PATH" MANPATH="$PWD/share/man:"
+    source share/bash-completion/completions/absenc
+
+This program is linked statically and runs on any Linux since Debian 11. It has every verb but these, for which the
+Debian packages are: serve (absenc-serve), record to HDF5 (absenc-hdf5) and emulate --spidev (absenc).
+`absenc doctor`, `read`, `scan`, `identify`, `conform`, `decode`, `emulate` and `record` to CSV or JSON lines work.
+LICENSE is that of absenc, licences/ has those of the libraries inside. The libraries under the LGPL (glibc, libgpiod)
+can be replaced by building absenc from its sources, which are published beside this archive.
+"""
+
+
+def identifier(name):
+    return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", name)
+
+
+def sysroot(architecture):
+    """Returns a folder with Debian 12's headers and libraries for this architecture; makes it once."""
+    root = TREES / f"sysroot-{architecture.name}"
+    if not (root / "complete").is_file():
+        say(f"Debian's headers and libraries for {architecture.name}")
+        shutil.rmtree(root, ignore_errors=True)
+        run("mmdebstrap", "--variant=extract", f"--architectures={architecture.name}", f"--include={','.join(SYSROOT_PACKAGES)}",
+            "bookworm", root)
+        relative_links(root)
+        (root / "complete").touch()
+    return root
+
+
+def relative_links(root):
+    """Makes absolute links in a root relative, so that a cross-compiler does not follow them into this computer."""
+    for path in root.rglob("*"):
+        if path.is_symlink() and os.readlink(path).startswith("/"):
+            target = root / os.readlink(path)[1:]
+            path.unlink()
+            path.symlink_to(os.path.relpath(target, path.parent))
+
+
+def main():
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--only", default=",".join(ARCHITECTURES))
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    chosen = parser.parse_args()
+    changed = run("git", "-C", ROOT, "status", "--porcelain")
+    if changed:
+        sys.exit(f"release: the files differ from the commit; commit them first:\n{changed}")
+    epoch = int(run("git", "-C", ROOT, "log", "-1", "--format=%ct"))
+    os.environ.update(SOURCE_DATE_EPOCH=str(epoch), LC_ALL="C.UTF-8", TZ="UTC", PYTHONDONTWRITEBYTECODE="1")
+    os.umask(0o022)
+    output = chosen.output.resolve()
+    output.mkdir(parents=True)
+    TREES.mkdir(parents=True, exist_ok=True)
+    release = Release(output, chosen.jobs, run("git", "-C", ROOT, "rev-parse", "--short=12", "HEAD").strip(), epoch)
+    release.sources()
+    for name in chosen.only.split(","):
+        release.debian_packages(ARCHITECTURES[name])
+        release.static_artefacts(ARCHITECTURES[name])
+    release.lists()
+    say(f"{len(release.inside)} artefacts are in {output}")
+
+
+if __name__ == "__main__":
+    main()
