@@ -1,0 +1,144 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Installs the Debian packages in a clean Debian 12 without a network, and tries them."""
+import json
+import re
+import subprocess
+import unittest
+
+from root_support import RELEASE, SOURCE, VERSION, RootCase, artefact, base
+
+PACKAGES = ("absenc", "absenc-serve", "absenc-hdf5", "libabsenc-dev", "python3-absenc")
+# Tags of lintian that are allowed, and why.
+ALLOWED = {}
+
+
+def dependencies():
+    """Returns the packages that those of absenc need, and the tools with which they are tried."""
+    names = {"iproute2", "curl", "ca-certificates", "systemd", "python3-h5py"}
+    for package in PACKAGES:
+        fields = subprocess.run(["dpkg-deb", "-f", artefact(f"{package}_*_amd64.deb"), "Depends"], check=True,
+                                capture_output=True, text=True).stdout
+        names |= set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", fields.strip()))
+    return sorted(names - set(PACKAGES))
+
+
+def archive():
+    return base("bookworm-with-dependencies", "bookworm", dependencies())
+
+
+class Installed(RootCase):
+    archive = staticmethod(archive)
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.case = cls()
+        for package in PACKAGES:
+            cls.case.put(artefact(f"{package}_*_amd64.deb"))
+        cls.case.shell("dpkg -i /work/*.deb", timeout=300)
+
+    def test_command(self):
+        self.try_the_command("absenc")
+
+    def test_command_loads_few_libraries(self):
+        loaded = self.shell("ldd /usr/bin/absenc").splitlines()
+        self.assertLessEqual(len(loaded), 20, loaded)
+        self.assertEqual([line for line in loaded if re.search("hdf5|curl|gnutls|ldap", line)], [])
+
+    def test_each_format_of_captures(self):
+        for ending in ("sr", "vcd", "csv"):
+            with self.subTest(ending):
+                name = f"/work/wave.{ending}"
+                self.run_inside("absenc", "wave", "sim:tformat", "--output", name, status=None)
+                if not (self.root / name[1:]).exists():
+                    self.shell(f"absenc wave tformat --output {name}")
+                self.assertIn("deg", self.run_inside("absenc", "decode", "tformat", name))
+
+    def test_hdf5(self):
+        self.run_inside("absenc", "record", "sim:tformat", "--output", "/work/log.h5", "--count", "3")
+        said = self.run_inside("python3", "-c", "import absenc; print(len(absenc.load_recording('/work/log.h5'))) if hasattr("
+                               "absenc, 'load_recording') else print(open('/work/log.h5', 'rb').read(4))")
+        self.assertRegex(said, r"3|HDF")
+
+    def test_server_with_its_page(self):
+        said = self.shell("""
+            absenc serve sim:tformat --listen 127.0.0.1:8420 --history none >/tmp/serve 2>&1 & server=$!
+            while ! grep -q '^http' /tmp/serve; do kill -0 $server; done
+            curl -fsS http://127.0.0.1:8420/ | head -c 300
+            echo
+            curl -fsS http://127.0.0.1:8420/openapi.json | head -c 100
+            kill $server""")
+        self.assertIn("<!doctype html>", said.lower())
+        self.assertIn("openapi", said)
+
+    def test_python(self):
+        self.assertIn("True", self.run_inside("python3", "-c", "import absenc; print(absenc.open('sim:tformat').read().valid)"))
+
+    def test_service_has_a_user_and_waits_for_its_configuration(self):
+        self.assertIn("dialout", self.run_inside("id", "absenc"))
+        unit = (self.root / "lib/systemd/system/absenc.service").read_text()
+        self.assertIn("ConditionPathExists=/etc/absenc/absenc.toml", unit)
+        self.assertIn("enabled", self.run_inside("systemctl", "--root=/", "is-enabled", "absenc.service"))
+        self.assertEqual(self.run_inside("systemd-analyze", "verify", "/lib/systemd/system/absenc.service", status=None).count(
+            "absenc.service:"), 0)
+
+
+class Upgraded(RootCase):
+    """A package with the files of version 0.1.0, and what becomes of it."""
+
+    archive = staticmethod(archive)
+
+    def test_upgrade_remove_and_purge(self):
+        old = self.scratch / "old"
+        for path, text in (("usr/bin/absenc", "#!/bin/sh\n"), ("usr/lib/systemd/system/absenc.service", "[Unit]\n"),
+                           ("usr/share/doc/absenc/serve.md", "x\n")):
+            file = old / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        (old / "DEBIAN").mkdir()
+        (old / "DEBIAN/control").write_text("Package: absenc\nVersion: 0.1.0\nArchitecture: amd64\nMaintainer: a <a@b.invalid>\n"
+                                            "Description: old\n")
+        subprocess.run(["dpkg-deb", "--root-owner-group", "-b", old, self.root / "work/old.deb"], check=True, capture_output=True)
+        self.shell("dpkg -i /work/old.deb; mkdir -p /etc/absenc /var/lib/absenc; echo x > /etc/absenc/absenc.toml;"
+                   "echo x > /var/lib/absenc/history.sqlite")
+        for package in ("absenc", "absenc-serve", "absenc-hdf5"):
+            self.put(artefact(f"{package}_*_amd64.deb"))
+        self.shell("dpkg -i /work/absenc*.deb", timeout=300)
+        self.assertIn(f"absenc {VERSION}", self.run_inside("absenc", "--version"))
+        self.assertIn("absenc-serve", self.shell("dpkg -S lib/systemd/system/absenc.service"))
+        self.shell("dpkg -r absenc-serve absenc-hdf5 absenc")
+        for kept in ("etc/absenc/absenc.toml", "var/lib/absenc/history.sqlite"):
+            self.assertTrue((self.root / kept).exists(), kept)
+        self.assertFalse((self.root / "usr/lib/absenc").exists())
+        self.shell("dpkg -P absenc-serve absenc-hdf5 absenc")
+        self.assertFalse((self.root / "var/lib/absenc").exists())
+        self.assertTrue((self.root / "etc/absenc/absenc.toml").exists(), "the user wrote it, so it stays")
+        self.assertEqual(self.shell("dpkg -l | grep absenc || true"), "")
+
+
+class Artefacts(unittest.TestCase):
+    def test_lintian(self):
+        packages = sorted(RELEASE.glob("*.deb"))
+        self.assertGreater(len(packages), 4)
+        said = subprocess.run(["lintian", "--allow-root", "--tag-display-limit", "0", *packages], capture_output=True, text=True,
+                              timeout=600).stdout
+        tags = [line for line in said.splitlines() if line.startswith(("E:", "W:"))]
+        self.assertEqual([line for line in tags if line.split(": ")[2].split()[0] not in ALLOWED], [])
+
+    def test_sums_and_lists_are_complete(self):
+        subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=RELEASE, check=True)
+        names = {path.name for path in RELEASE.iterdir()}
+        listed = {line.split()[1] for line in (RELEASE / "SHA256SUMS").read_text().splitlines()}
+        self.assertEqual(listed, names - {"SHA256SUMS"})
+        spdx = json.loads((RELEASE / "absenc.spdx.json").read_text())
+        files = {one["packageFileName"] for one in spdx["packages"] if "packageFileName" in one}
+        self.assertEqual(files, names - {"SHA256SUMS", "absenc.spdx.json", f"absenc-{VERSION}-licences.tar.gz"})
+        known = {one["SPDXID"] for one in spdx["packages"]}
+        for relation in spdx["relationships"]:
+            self.assertIn(relation["relatedSpdxElement"], known)
+        self.assertTrue((SOURCE / "LICENSE").is_file())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clean Linux systems in folders, in which the artefacts of ./dev release are tried without a network."""
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parents[2]))
+VERSION = (SOURCE / "VERSION").read_text().strip()
+RELEASE = Path(os.environ.get("ABSENC_RELEASE", SOURCE / f"build/release-{VERSION}"))
+ROOTS = SOURCE / "build/release-roots"
+# Runs a program in a root: no network but its own loopback, and no process of it outlives the test.
+ISOLATED = ["unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "sh", "-ec",
+            'ip link set lo up 2>/dev/null || true; mount --bind /dev "$1/dev"; mount -t proc proc "$1/proc"; '
+            'mount -t devpts -o newinstance,ptmxmode=0666 devpts "$1/dev/pts" 2>/dev/null || true; '
+            'root=$1; shift; exec chroot "$root" "$@"', "sh"]
+
+
+def artefact(pattern):
+    found = sorted(RELEASE.glob(pattern))
+    if len(found) != 1:
+        raise AssertionError(f"{RELEASE} has {len(found)} of {pattern}, but should have 1")
+    return found[0]
+
+
+def base(name, suite, packages):
+    """Returns the archive of a root with these packages; makes it once, from Debian's archive."""
+    path = ROOTS / f"{name}.tar"
+    wanted = f"{suite} {' '.join(packages)}\n"
+    made_of = ROOTS / f"{name}.packages"
+    if not path.is_file() or not made_of.is_file() or made_of.read_text() != wanted:
+        ROOTS.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["mmdebstrap", "--variant=minbase", f"--include={','.join(packages)}", suite, path], check=True,
+                       capture_output=True, timeout=600)
+        made_of.write_text(wanted)
+    return path
+
+
+class RootCase(unittest.TestCase):
+    """A test in a root that is unpacked for each class."""
+
+    archive = None  # a function that returns the archive
+
+    @classmethod
+    def setUpClass(cls):
+        if os.geteuid() != 0:
+            raise AssertionError("a clean root needs root: run ./dev release --test as root")
+        cls.scratch = Path(tempfile.mkdtemp(prefix="absenc-root-"))
+        cls.addClassCleanup(shutil.rmtree, cls.scratch)
+        cls.root = cls.scratch / "root"
+        cls.root.mkdir()
+        if cls.archive is not None:
+            subprocess.run(["tar", "-xf", cls.archive(), "-C", cls.root, "--exclude=./dev/*"], check=True)
+        for folder in ("dev", "proc", "tmp", "work"):
+            (cls.root / folder).mkdir(exist_ok=True)
+
+    def run_inside(self, *command, status=0, timeout=120):
+        done = subprocess.run([*ISOLATED, str(self.root), *map(str, command)], stdin=subprocess.DEVNULL,
+                              capture_output=True, text=True, timeout=timeout,
+                              env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/work", "LC_ALL": "C.UTF-8",
+                                   "DEBIAN_FRONTEND": "noninteractive"})
+        if status is not None:
+            self.assertEqual(done.returncode, status, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}")
+        return done.stdout + done.stderr
+
+    def put(self, path, name=None):
+        shutil.copy(path, self.root / "work" / (name or Path(path).name))
+
+    def shell(self, script, **settings):
+        return self.run_inside("sh", "-euc", script, **settings)
+
+    def try_the_command(self, absenc):
+        """Tries what each installation of the command can do."""
+        self.put(SOURCE / "examples/tformat.txt")
+        self.assertRegex(self.run_inside(absenc, "--version"), rf"^absenc {re.escape(VERSION)}\n")
+        self.assertIn("tformat", self.run_inside(absenc, "list"))
+        self.assertIn("turns", self.run_inside(absenc, "read", "sim:tformat"))
+        self.assertIn("deg", self.run_inside(absenc, "decode", "tformat", "/work/tformat.txt", "--csv"))
+        self.assertIn("tformat", self.run_inside(absenc, "identify", "/work/tformat.txt"))
+        self.assertIn("good", self.run_inside(absenc, "doctor", "sim:tformat", "--readings", "100"))
+        self.run_inside(absenc, "record", "sim:tformat", "--output", "/work/log.csv", "--count", "3")
+        self.assertTrue((self.root / "work/log.csv").read_text().startswith("# absenc record 1\n"))
+        (self.root / "work/log.csv").unlink()
+        said = self.shell(f"""
+            {absenc} emulate tformat --tcp 0 --for 20 >/tmp/emulator 2>&1 & emulator=$!
+            while ! grep -q '^ready: tcp' /tmp/emulator; do kill -0 $emulator; done
+            {absenc} read "tformat:$(sed -n 's/^ready: //p' /tmp/emulator | grep tcp)" --count 2
+            kill $emulator""")
+        self.assertEqual(said.count("no alarms"), 2, said)
