@@ -3,7 +3,7 @@
 """usage: release.py OUTPUT [--only amd64,arm64,armhf] [--jobs N]
 
 Builds everything that is published into the folder OUTPUT, which must not exist: Debian packages, static tarballs, wheels,
-the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/release-trees.
+the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/tree-*.
 The same commit gives the same bits: nothing in an artefact depends on folder, user or time.
 """
 import argparse
@@ -122,7 +122,7 @@ class Release:
 
     def tree(self, architecture, kind, *options):
         """Configures a build tree and returns its path."""
-        path = TREES / f"{architecture.name}-{kind}"
+        path = ROOT / f"build/tree-{architecture.name}-{kind}"  # as deep as other trees, for a compiler cache
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG", "-DCMAKE_INSTALL_PREFIX=/usr",
                    "-DABSENC_WERROR=ON", "-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF", "-DPython3_EXECUTABLE=/usr/bin/python3", *options]
         if not architecture.native:
