@@ -349,7 +349,9 @@ def main():
     if changed:
         sys.exit(f"release: the files differ from the commit; commit them first:\n{changed}")
     epoch = int(run("git", "-C", ROOT, "log", "-1", "--format=%ct"))
-    os.environ.update(SOURCE_DATE_EPOCH=str(epoch), LC_ALL="C.UTF-8", TZ="UTC", PYTHONDONTWRITEBYTECODE="1")
+    for name in [name for name in os.environ if name.startswith(("LC_", "LANG"))]:
+        del os.environ[name]
+    os.environ.update(SOURCE_DATE_EPOCH=str(epoch), TZ="UTC", PYTHONDONTWRITEBYTECODE="1")
     os.umask(0o022)
     output = chosen.output.resolve()
     output.mkdir(parents=True)
