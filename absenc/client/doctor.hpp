@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absenc/core/time.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
 
@@ -147,6 +148,14 @@ struct Examination {
   [[nodiscard]] std::string verdict() const;
 };
 
+/// A request of the diagnosis with its reply, without the adapter's echo. The frames are valid during the callback.
+struct DoctorExchange {
+  Time sent{};            ///< Time of the port's clock at which the request ended.
+  Time answered_after{};  ///< Time from the end of the request to the beginning of the reply; 0 without a reply.
+  Frame request{};        ///< The request; empty: the encoder sends without requests.
+  Frame reply{};          ///< The reply; empty: there was none.
+};
+
 /// Limits of the diagnosis, and its callbacks.
 struct DoctorChoices {
   std::size_t readings = 100'000;  ///< Greatest number of readings of a series with the given settings.
@@ -154,6 +163,8 @@ struct DoctorChoices {
   Time limit = std::chrono::seconds(3);
   Time turning{};  ///< Time of further readings while the user turns the shaft by hand; 0: none.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
+  /// Called with each request of the diagnosis and what was received after it. Empty: never.
+  std::function<void(const DoctorExchange& exchange)> exchanged{};
   /// Polled during the diagnosis; true ends it. Empty: never.
   std::function<bool()> over{};
 };

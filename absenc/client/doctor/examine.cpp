@@ -118,7 +118,7 @@ class Doctor {
   template <class Item>
   void look_over() {
     {
-      Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
+      Examiner<Item> examiner(address_, surroundings_.open(address_), choices_);
       const bool wired = address_.unit->link == LinkKind::half_duplex || address_.unit->link == LinkKind::full_duplex;
       if (wired && !streams(address_)) {
         tell("listening");
@@ -248,7 +248,7 @@ class Doctor {
   template <class Item>
   void read_again() {
     tell("reading");
-    Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
+    Examiner<Item> examiner(address_, surroundings_.open(address_), choices_);
     examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
     examiner.conclude(seen_);
   }
@@ -261,7 +261,7 @@ class Doctor {
     const Command* read = find_command(*address.unit, Verb::read);
     if (read == nullptr || read->changes_encoder) return {};
     try {
-      Examiner<Item> examiner(address, surroundings_.open(address), choices_.over);
+      Examiner<Item> examiner(address, surroundings_.open(address), choices_);
       examiner.wait_until(earliest);
       const Time begin = examiner.now();
       const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character();

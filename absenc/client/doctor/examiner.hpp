@@ -16,9 +16,9 @@ namespace absenc::client {
 template <class Item>
 class Examiner {
  public:
-  /// Takes over an open link. Every wait on the link ends with os::Ended as soon as `over` returns true; an empty
-  /// `over` never does.
-  Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
+  /// Takes over an open link, and uses the callbacks `over` and `exchanged` of `choices`. Every wait on the link ends
+  /// with os::Ended as soon as `over` returns true; an empty `over` never does.
+  Examiner(const EncoderAddress& address, Link link, const DoctorChoices& choices)
       : link_(std::move(link)),
         runner_(address),
         unit_(*address.unit),
@@ -29,7 +29,11 @@ class Examiner {
     } else {
       runner_.attach(*link_.bytes, link_.latency);
     }
-    runner_.port().over = std::move(over);
+    runner_.port().over = choices.over;
+    runner_.on_exchange = [this, exchanged = choices.exchanged](const LineExchange<Item>& line) {
+      if (exchanged) tell_exchange(line, exchanged);
+      if (observer_) observer_(line);
+    };
   }
 
   /// Listens before the first request and records unsolicited bytes. Does nothing on CAN, where other nodes may send.
@@ -75,7 +79,7 @@ class Examiner {
       const std::size_t before = seen.readings.size();
       std::vector<Attempted> failed;  // failed requests of the present reading
       StreamBytes stream;
-      const Hook hook(runner_, [&](const LineExchange<Item>& line) { record_failure(line, failed); });
+      const Hook hook(*this, [&](const LineExchange<Item>& line) { record_failure(line, failed); });
       const auto attempt = [&] {
         failed.clear();
         Attempted one = attempt_reading(command);
@@ -117,16 +121,25 @@ class Examiner {
   /// Calls a function for each exchange of the runner, as long as this object lives.
   class Hook {
    public:
-    Hook(Runner<Item>& runner, std::function<void(const LineExchange<Item>&)> function) : runner_(runner) {
-      runner_.on_exchange = std::move(function);
+    Hook(Examiner& examiner, std::function<void(const LineExchange<Item>&)> function) : examiner_(examiner) {
+      examiner_.observer_ = std::move(function);
     }
     Hook(const Hook&) = delete;
     Hook& operator=(const Hook&) = delete;
-    ~Hook() { runner_.on_exchange = nullptr; }
+    ~Hook() { examiner_.observer_ = nullptr; }
 
    private:
-    Runner<Item>& runner_;
+    Examiner& examiner_;
   };
+
+  void tell_exchange(const LineExchange<Item>& line,
+                     const std::function<void(const DoctorExchange&)>& exchanged) const {
+    const capture::ObservedExchange exchange = observed_exchange<Item>(line.request, line.reply(), line.clocks);
+    exchanged({.sent = line.sent_at,
+               .answered_after = line.answered_after(runner_.character()),
+               .request = exchange.request.frame(),
+               .reply = exchange.reply.frame()});
+  }
 
   static Series series(std::size_t count, Time limit) {
     return {.count = count, .limit = limit, .patience = never, .least = longest_gap};
@@ -168,6 +181,7 @@ class Examiner {
   const Unit& unit_;
   Options options_;
   bool streams_;
+  std::function<void(const LineExchange<Item>&)> observer_{};  // set by Hook
 };
 
 }  // namespace absenc::client

@@ -10,6 +10,7 @@
 #include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "tools/absenc/bug_report.hpp"
 #include "tools/absenc/capture_choices.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -165,6 +166,9 @@ int run_decode(const Invocation& invocation) {
   }
   const std::string_view first = invocation.text("protocol");
   std::error_code error;
+  if (!invocation.has("file") && std::filesystem::is_regular_file(first, error) && is_report(std::string(first))) {
+    return show_report(std::string(first));
+  }
   if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(first, error)) {
     return identify_instead(first);
   }
@@ -211,12 +215,13 @@ constexpr std::array<Parameter, 15> decode_parameters{{
     {"--json", "", "one JSON object; of a capture one a line"},
 }};
 
-constexpr std::array<Example, 5> decode_examples{{
+constexpr std::array<Example, 6> decode_examples{{
     {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"",
      "a position, its turns and alarms"},
     {"absenc decode tformat --hex 0200cdab0165 --option strict=false --bits", "the same, and which bits they are"},
     {"absenc decode tformat --hex 0200cdab0165 --option strict=false --json", "without the request, for a program"},
     {"absenc decode tformat drive.sr --channel D0 --stats", "what an hour of a line under load comes to"},
+    {"absenc decode bug.zip", "a report of `absenc doctor --report`"},
     {"absenc decode ssi probe.vcd --channel clock=D0,data=D1 --option bits=17", "each word of a clocked encoder"},
 }};
 

@@ -9,6 +9,7 @@
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/bug_report.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -66,6 +67,10 @@ int run_doctor(const Invocation& invocation) {
   choices.limit = seconds("--for", 3, 0.1);
   choices.turning = seconds("--turn", 0, 0);
   choices.progress = [&](const std::string& what) { progress.show(what); };
+  using SerialNumbers = ReportedExchanges::SerialNumbers;
+  const auto serial_numbers = invocation.has("--serial-numbers") ? SerialNumbers::shown : SerialNumbers::masked;
+  ReportedExchanges exchanges(*address.unit, address.options, serial_numbers);
+  if (invocation.has("--report")) choices.exchanged = [&](const DoctorExchange& one) { exchanges.add(one); };
   const Examination examination = examine(address, choices);
   progress.clear();
   if (invocation.has("--json")) {
@@ -75,22 +80,36 @@ int run_doctor(const Invocation& invocation) {
     for (const Finding& one : examination.findings) text += finding_text(one);
     print_line(text + examination.verdict());
   }
+  if (invocation.has("--report")) {
+    const BugReport report = make_report(address, examination, exchanges, serial_numbers);
+    const std::string path(invocation.text("--report"));
+    print_note(
+        fmt::format("The report holds this, and in exchanges.txt the exchanges themselves:\n\n{}", report.summary));
+    write_report(path, report);
+    print_message(fmt::format("{} is written; `absenc decode {}` shows all of it", path, path));
+  }
   return examination.healthy() ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 6> doctor_parameters{{
+constexpr std::array<Parameter, 8> doctor_parameters{{
     parameter::encoder,
     {"--for", "SECONDS", "how long it reads, as fast as it can", "3"},
     {"--readings", "N", "it ends after so many readings", "100000"},
     {"--turn", "SECONDS",
      "then look on while you turn the shaft by hand: a position that stands, jumps, codes that are missing", "0"},
+    {"--report", "FILE.zip",
+     "also write a report for those who correct absenc: versions, adapter, settings, findings, the last thousand "
+     "exchanges; what it holds is shown first"},
+    {"--serial-numbers", "", "do not mask serial numbers in the report"},
     parameter::json,
     parameter::option,
 }};
 
-constexpr std::array<Example, 4> doctor_examples{{
+constexpr std::array<Example, 5> doctor_examples{{
     {"absenc doctor /dev/ttyUSB0", "which encoder is there, and what is wrong with it"},
     {"absenc doctor tformat:/dev/ttyUSB0", "what is wrong with it, or with the way to it"},
+    {"absenc doctor tformat:/dev/ttyUSB0 --report bug.zip",
+     "the same as a file to send; `absenc decode bug.zip` shows it"},
     {"absenc doctor tformat:/dev/ttyUSB0 --turn 10", "also while the shaft is turned by hand"},
     {"absenc doctor \"sim:tformat?fault=corrupt=0.1\" --json", "a virtual encoder on a bad line, for programs"},
 }};
