@@ -58,6 +58,7 @@ class _Kind(NamedTuple):
     of_text: Callable[[str], Any]
 
 
+_FORMAT = 1  # the format of recordings that this version writes and reads
 _REAL = _Kind("f8", np.nan, float)
 _SIGNED = _Kind("i8", 0, int)
 _UNSIGNED = _Kind("u8", 0, int)
@@ -176,7 +177,9 @@ def _load_hdf5(path: Path) -> Recording:
             name: value.decode() if isinstance(value, bytes) else f"{value:g}" if value.dtype.kind == "f" else str(value)
             for name, value in file.attrs.items()
         }
-        if attributes.pop("absenc_record", "") != "1":
+        if attributes.get("absenc_record", "1").isdigit() and int(attributes.get("absenc_record", "1")) > _FORMAT:
+            raise _newer(path, attributes["absenc_record"])
+        if attributes.pop("absenc_record", "") != str(_FORMAT):
             raise Failure(f"{path} is HDF5, but no recording of absenc")
         names = attributes.pop("columns").split(",")
         ended = attributes.pop("rows", NOT_ENDED)
@@ -205,6 +208,16 @@ def _load_hdf5(path: Path) -> Recording:
     return Recording(masked, columns, attributes, ended != NOT_ENDED)
 
 
+def _newer(path: Path, version: str) -> Failure:
+    return Failure(f"{path} is a recording of format {version}, but this absenc reads {_FORMAT}: use a newer absenc")
+
+
+def _refuse_newer(path: Path, title: "re.Match[bytes] | None") -> None:
+    version = (title[1] or title[2]).decode() if title else "1"
+    if int(version) > _FORMAT:
+        raise _newer(path, version)
+
+
 def load(file: Union[str, os.PathLike[str]]) -> Recording:
     """Loads a recording of `absenc record`, whose name ends in .csv, .jsonl, .ndjson, .h5 or .hdf5.
 
@@ -220,6 +233,7 @@ def load(file: Union[str, os.PathLike[str]]) -> Recording:
     if path.suffix not in parsers:
         raise UsageError(f"{path} is no recording by its name: it must end in {', '.join(parsers)}, .h5 or .hdf5")
     content = path.read_bytes()
+    _refuse_newer(path, re.match(rb'# absenc record (\d+)\n|\{"absenc_record":(\d+),', content))
     if not content.startswith((b"# absenc record 1\n", b'{"absenc_record":1,')):
         raise Failure(f"{path} does not begin as a recording does")
     whole, _, cut = content.rpartition(b"\n")

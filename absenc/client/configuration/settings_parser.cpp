@@ -16,6 +16,7 @@ namespace absenc::client {
 
 namespace {
 
+constexpr std::int64_t format_version = 1;
 constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
 
 std::string_view type_of(const toml::node& node) {
@@ -58,7 +59,7 @@ class SettingsFileReader {
   }
 
   [[nodiscard]] SettingsFile config(const toml::table& file) const {
-    static constexpr std::array<std::string_view, 4> known{"defaults", "bus", "encoder", "serve"};
+    static constexpr std::array<std::string_view, 5> known{"defaults", "bus", "encoder", "serve", "version"};
     SettingsFile config{.path = path_, .defaults = {}, .buses = {}, .encoders = {}, .services = {}};
     for (const auto& [key, node] : in_file_order(file)) {
       if (key->str() == known[0]) {
@@ -69,6 +70,8 @@ class SettingsFileReader {
         config.encoders = sections(*key, *node);
       } else if (key->str() == known[3]) {
         config.services = sections(*key, *node);
+      } else if (key->str() == known[4]) {
+        check_version(*key, *node);
       } else {
         refuse(*key, fmt::format("there is no section \"{}\"{}", key->str(), suggestion(key->str(), known)));
       }
@@ -77,6 +80,16 @@ class SettingsFileReader {
   }
 
  private:
+  // The version of the format, which a file need not state.
+  void check_version(const toml::key& key, const toml::node& node) const {
+    const auto* number = node.as_integer();
+    if (number == nullptr || number->get() < 1) refuse(key, "version must be the whole number 1");
+    if (number->get() > format_version) {
+      refuse(key, fmt::format("the file is of format {}, but this absenc reads {}: use a newer absenc", number->get(),
+                              format_version));
+    }
+  }
+
   [[noreturn]] void refuse(const toml::key& key, const std::string& sentence) const {
     throw UsageError(fmt::format("{}: {}", place(key.source().begin), sentence));
   }

@@ -183,5 +183,13 @@ TEST_F(Environment, WhereTheFileIsLookedFor) {
   EXPECT_THAT(settings_file_paths(), ElementsAre("absenc.toml"));
 }
 
+TEST(SettingsFile, MayStateItsVersion) {
+  const std::string rest = "[encoder.elbow]\nprotocol = \"tformat\"\nport = \"sim\"\n";
+  EXPECT_EQ(refusal("version = 1\n" + rest), "accepted");
+  EXPECT_THAT(refusal("version = 2\n" + rest),
+              AllOf(StartsWith("file:1:1: the file is of format 2"), HasSubstr("use a newer absenc")));
+  EXPECT_THAT(refusal("version = \"x\"\n" + rest), HasSubstr("must be the whole number 1"));
+}
+
 }  // namespace
 }  // namespace absenc::client
