@@ -250,7 +250,7 @@ class Usage(Case):
     def test_version_has_three_numbers(self):
         result = absenc("--version")
         self.assert_good(result)
-        self.assertRegex(result.stdout, r"^absenc \d+\.\d+\.\d+\n$")
+        self.assertRegex(result.stdout, r"^absenc \d+\.\d+\.\d+\ncommit \w+\nfor \w+\nbuilt in: .+\n$")
 
     def test_refuses_wrong_usage(self):
         for arguments, words in [(["raed"], ["did you mean read?"]),

@@ -126,6 +126,13 @@ class Artefacts(unittest.TestCase):
         tags = [line for line in said.splitlines() if line.startswith(("E:", "W:"))]
         self.assertEqual([line for line in tags if line.split(": ")[2].split()[0] not in ALLOWED], [])
 
+    def test_readme_names_what_is_there(self):
+        section = (SOURCE / "README.md").read_text().split("## Install\n")[1].split("\n## ")[0]
+        names = set(re.findall(r"(absenc[\w.-]*(?:\.deb|\.whl|\.tar\.gz))|(?<=\./)([\w.-]+\.deb)", section))
+        named = {one or other for one, other in names}
+        self.assertGreater(len(named), 6)
+        self.assertEqual({name for name in named if not (RELEASE / name).is_file()}, set())
+
     def test_sums_and_lists_are_complete(self):
         subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=RELEASE, check=True)
         names = {path.name for path in RELEASE.iterdir()}
