@@ -50,16 +50,13 @@ class Installed(RootCase):
         for ending in ("sr", "vcd", "csv"):
             with self.subTest(ending):
                 name = f"/work/wave.{ending}"
-                self.run_inside("absenc", "wave", "sim:tformat", "--output", name, status=None)
-                if not (self.root / name[1:]).exists():
-                    self.shell(f"absenc wave tformat --output {name}")
+                self.run_inside("absenc", "wave", "tformat", name)
                 self.assertIn("deg", self.run_inside("absenc", "decode", "tformat", name))
 
     def test_hdf5(self):
         self.run_inside("absenc", "record", "sim:tformat", "--output", "/work/log.h5", "--count", "3")
-        said = self.run_inside("python3", "-c", "import absenc; print(len(absenc.load_recording('/work/log.h5'))) if hasattr("
-                               "absenc, 'load_recording') else print(open('/work/log.h5', 'rb').read(4))")
-        self.assertRegex(said, r"3|HDF")
+        said = self.run_inside("python3", "-c", "import h5py; print(len(h5py.File('/work/log.h5')['time_s']))")
+        self.assertEqual(said, "3\n")
 
     def test_server_with_its_page(self):
         said = self.shell("""
@@ -104,7 +101,8 @@ class Upgraded(RootCase):
                    "echo x > /var/lib/absenc/history.sqlite")
         for package in ("absenc", "absenc-serve", "absenc-hdf5"):
             self.put(artefact(f"{package}_*_amd64.deb"))
-        self.shell("dpkg -i /work/absenc*.deb", timeout=300)
+        # apt installs the packages in this order, because absenc-serve breaks the old absenc
+        self.shell("dpkg -i /work/absenc_*.deb; dpkg -i /work/absenc-*.deb", timeout=300)
         self.assertIn(f"absenc {VERSION}", self.run_inside("absenc", "--version"))
         self.assertIn("absenc-serve", self.shell("dpkg -S lib/systemd/system/absenc.service"))
         self.shell("dpkg -r absenc-serve absenc-hdf5 absenc")

@@ -78,7 +78,8 @@ class RootCase(unittest.TestCase):
         self.assertRegex(self.run_inside(absenc, "--version"), rf"^absenc {re.escape(VERSION)}\n")
         self.assertIn("tformat", self.run_inside(absenc, "list"))
         self.assertIn("turns", self.run_inside(absenc, "read", "sim:tformat"))
-        self.assertIn("deg", self.run_inside(absenc, "decode", "tformat", "/work/tformat.txt", "--csv"))
+        # one of its replies is damaged on purpose
+        self.assertIn("bad_checksum", self.run_inside(absenc, "decode", "tformat", "/work/tformat.txt", "--csv", status=1))
         self.assertIn("tformat", self.run_inside(absenc, "identify", "/work/tformat.txt"))
         self.assertIn("good", self.run_inside(absenc, "doctor", "sim:tformat", "--readings", "100"))
         self.run_inside(absenc, "record", "sim:tformat", "--output", "/work/log.csv", "--count", "3")
