@@ -6,16 +6,32 @@ check_cxx_source_compiles("
 #include <bit>
 #include <concepts>
 #include <coroutine>
+#include <cstddef>
 #include <span>
 template <std::integral T> consteval T twice(T value) { return 2 * value; }
 struct Pair { int one = 1; bool operator==(const Pair&) const = default; };
+struct Place {};
+struct Task {  // g++ 11 does not find the allocation function of such a coroutine
+  struct promise_type {
+    template <class... Parameters>
+    static void* operator new(std::size_t, Place&, const Parameters&...) noexcept { return nullptr; }
+    static void operator delete(void*, std::size_t) {}
+    static Task get_return_object_on_allocation_failure() { return {}; }
+    Task get_return_object() { return {}; }
+    std::suspend_never initial_suspend() noexcept { return {}; }
+    std::suspend_never final_suspend() noexcept { return {}; }
+    void return_void() {}
+    void unhandled_exception() {}
+  };
+};
+Task wait(Place&, int) { co_return; }
 int main() {
   const int values[] = {twice(std::bit_cast<int>(1.0f))};
   return std::span(values).size() == 1 && Pair{.one = 1} == Pair{} && std::coroutine_handle<>{} == nullptr ? 0 : 1;
 }" ABSENC_HAS_CXX20)
 unset(CMAKE_REQUIRED_FLAGS)
 if(NOT ABSENC_HAS_CXX20)
-  message(FATAL_ERROR "absenc needs a compiler for C++20 (g++ 11, clang 14 or newer), which ${CMAKE_CXX_COMPILER} is not.")
+  message(FATAL_ERROR "absenc needs a compiler for C++20 (g++ 12, clang 14 or newer), which ${CMAKE_CXX_COMPILER} is not.")
 endif()
 
 # Sets `result` to the libraries of these names as the linker is to find them: with ABSENC_STATIC the static ones.

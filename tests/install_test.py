@@ -397,7 +397,7 @@ class Installed(Case):
         done = subprocess.run(["cmake", "-G", "Ninja", "-S", SOURCE, "-B", self.folder / "old",
                                f"-DCMAKE_CXX_COMPILER={old}"], capture_output=True, text=True, timeout=100)
         self.assertNotEqual(done.returncode, 0)
-        self.assertIn(f"absenc needs a compiler for C++20 (g++ 11, clang 14 or newer), which {old} is not.",
+        self.assertIn(f"absenc needs a compiler for C++20 (g++ 12, clang 14 or newer), which {old} is not.",
                       " ".join(done.stderr.split()))
         self.assertLess(len(done.stderr.splitlines()), 12)
 

@@ -63,6 +63,10 @@ class Compilers(unittest.TestCase):
 
     def test_add_subdirectory(self):
         for compiler in self.each():
+            if compiler == "g++-11":  # cannot allocate the coroutines of the units; it compiles programs that use them
+                with self.assertRaisesRegex(AssertionError, "absenc needs a compiler for C\\+\\+20"):
+                    self.project(compiler, f"add_subdirectory({SOURCE} absenc)\n")
+                continue
             self.project(compiler, f"add_subdirectory({SOURCE} absenc)\nadd_executable(program {SOURCE}/packages/fetchcontent/main.cpp)\n"
                          "target_link_libraries(program PRIVATE absenc::tformat)\n")
 
