@@ -11,6 +11,7 @@ check_cxx_source_compiles("
 template <std::integral T> consteval T twice(T value) { return 2 * value; }
 struct Pair { int one = 1; bool operator==(const Pair&) const = default; };
 struct Place {};
+struct Dialog : Place {};
 struct Task {  // g++ 11 does not find the allocation function of such a coroutine
   struct promise_type {
     template <class... Parameters>
@@ -24,7 +25,7 @@ struct Task {  // g++ 11 does not find the allocation function of such a corouti
     void unhandled_exception() {}
   };
 };
-Task wait(Place&, int) { co_return; }
+Task wait(Dialog&, int) { co_return; }
 int main() {
   const int values[] = {twice(std::bit_cast<int>(1.0f))};
   return std::span(values).size() == 1 && Pair{.one = 1} == Pair{} && std::coroutine_handle<>{} == nullptr ? 0 : 1;
