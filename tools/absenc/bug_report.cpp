@@ -104,7 +104,7 @@ void ReportedExchanges::add(const DoctorExchange& exchange) {
 
 std::string ReportedExchanges::text() const {
   std::string text;
-  for (const Line& line : lines_) text += line.text;
+  for (const ReportedLine& line : lines_) text += line.text;
   return text;
 }
 

@@ -43,11 +43,11 @@ class ReportedExchanges {
   SerialNumbers serial_numbers_;
   Time first_{};
   std::size_t masked_ = 0;  // number of masked replies among the lines
-  struct Line {
+  struct ReportedLine {
     std::string text;
     bool masked = false;
   };
-  std::deque<Line> lines_;
+  std::deque<ReportedLine> lines_;
 };
 
 struct BugReport {
