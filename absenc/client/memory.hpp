@@ -123,7 +123,7 @@ class MemoryChange {
   /// Reads the byte of `unknown` again, to find out whether it was written. Ignores a failure.
   void settle();
 
-  /// Returns the wanted bytes with their addresses.
+  /// Returns the bytes that the memory is to contain, with their addresses.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
   /// Returns the bytes that `look` read at the wanted addresses.
   [[nodiscard]] const MemoryImage& found() const { return found_; }

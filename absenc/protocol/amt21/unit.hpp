@@ -67,7 +67,7 @@ struct Protocol {
   using Format = amt21::Format;
   /// Type of requests to the encoder.
   using Request = amt21::Request;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = amt21::Reply;
   static constexpr std::size_t longest_reply = 2;  ///< Greatest length of a reply in bytes.
 

@@ -39,7 +39,7 @@ class ClockedHostOf : public ClockedEngine {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Returns the format of the encoder.

@@ -60,9 +60,9 @@ struct Report {
   using Protocol = P;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
   /// Items that the line carries.
   using Items = std::span<const ItemOf<P>>;
@@ -200,7 +200,7 @@ template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.

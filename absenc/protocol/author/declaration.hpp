@@ -21,11 +21,11 @@ template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.
   using Protocol = P;
-  /// Type of the protocol's virtual encoder.
+  /// C++ class of the protocol's virtual encoder.
   using Encoder = VirtualEncoder;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
 
   std::string_view id{};        ///< Identifier: the part of an address before the colon.

@@ -141,9 +141,9 @@ class BusDevice : public Responder {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.

@@ -38,9 +38,9 @@ class HostOf : public Engine {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Returns the format of the encoder.
@@ -123,9 +123,9 @@ class DialogOf : public HostOf<P>, public Routine {
   struct Nothing {};
 
  public:
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// A request that a procedure can await. With `must`, the procedure ends if no valid reply comes.

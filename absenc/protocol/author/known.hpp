@@ -13,7 +13,7 @@ template <class P, const typename P::Format& format, const typename P::Request& 
 struct Known {
   struct Format {};
   struct Request {};
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
   static constexpr std::size_t longest_reply = P::longest_reply;  ///< Greatest length of a reply in bytes.
 

@@ -32,7 +32,7 @@ struct Descriptor {
   using P = typename Declared::Protocol;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
   /// Tables of commands, models and vectors of the declaration.
   using Made = Tables<declared>;

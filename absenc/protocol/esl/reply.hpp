@@ -365,9 +365,9 @@ inline constexpr author::InARow reset_row{
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = Profile;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = esl::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 

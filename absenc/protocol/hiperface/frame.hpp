@@ -271,9 +271,9 @@ constexpr void doubt(Reading& reading) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = hiperface::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = hiperface::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = hiperface::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 

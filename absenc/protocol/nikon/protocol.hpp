@@ -78,9 +78,9 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = nikon::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = nikon::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = nikon::Reply;
   /// Greatest length in bytes of all replies to one request together.
   static constexpr std::size_t longest_reply = encoder_count * longest_one;

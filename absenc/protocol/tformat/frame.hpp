@@ -374,9 +374,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = tformat::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = tformat::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 

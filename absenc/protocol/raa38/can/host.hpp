@@ -27,7 +27,7 @@ struct Protocol {
   using Format = can::Format;
   /// Type of requests to the encoder.
   using Request = CanFrame;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = CanFrame;
 
   /// Returns how a host sends a frame; all frames are sent in the same manner.

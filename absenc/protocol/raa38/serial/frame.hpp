@@ -226,7 +226,7 @@ struct Protocol {
   using Format = serial::Format;
   /// Type of requests to the encoder.
   using Request = serial::Request;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
