@@ -160,8 +160,8 @@ struct Reply {
   std::uint8_t function = function::read;  ///< Function code of the reply.
   std::uint8_t address = 1;                ///< Address of the encoder; in the reply to set_address, the new address.
   std::uint32_t singleturn = 0;            ///< Only for the function `read`: position in counts.
-  std::uint8_t value = 0;                  ///< Number of the parameter that was set; only in the reply to the function `set_parameter`.
-  CrcOrder order = CrcOrder::low_first;    ///< Byte order of the CRC in the reply.
+  std::uint8_t value = 0;  ///< Number of the parameter that was set; only in the reply to the function `set_parameter`.
+  CrcOrder order = CrcOrder::low_first;  ///< Byte order of the CRC in the reply.
   /// Only for the function `read`: length of the reply in bytes if the CRC cannot prove this length; otherwise 0.
   std::size_t doubtful_size = 0;
 };
