@@ -25,6 +25,7 @@
   one(biss, chain_unit) \
   one(nikon, unit) \
   one(hiperface, unit) \
+  one(endat, unit) \
 
 #endif
 // clang-format on

@@ -367,6 +367,9 @@ struct Unit {
   /// in this reply that answers the host's bit; nothing: this reply has no such bit. Null: no reply of the unit has
   /// one.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
+  /// Bidirectional clocked links: returns the ranges of bits of this burst that the host sends, in their order; the
+  /// others are the reply. Null: other links.
+  BitRanges (*host_bits)(const Options& options, Frame burst) = nullptr;
   /// Returns the reading `now`, completed by alarms of `before`, the completed reading before it. Null: readings are
   /// not completed.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;

@@ -236,6 +236,7 @@ void Line<Item>::end_transfer(Node node) {
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = clocks, .width = period, .lead = host.lead});
     }
     finish(node);
+    if (kind_ == LinkKind::clocked_bidirectional && received_bits == 0) return;
     host.silence.received(now_);
     feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in, .bits = received_bits});
   }

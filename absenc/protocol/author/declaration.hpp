@@ -56,7 +56,7 @@ struct Declaration {
   /// Returns whether the options do not contradict each other. Null: they never do.
   bool (*is_usable)(const Format&) = nullptr;
   /// Returns the request that a reply captured without one is taken to answer, or an error.
-  Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
+  Result<Request> (*guess_request)(const Format&, ContentOf<P> reply) = nullptr;
   /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins so. Null: P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
   /// Returns the error to report for the reply to an invalid request. Null: `error`, the request's own error.
@@ -90,6 +90,8 @@ struct Declaration {
   /// For clocked links: returns the index of the bit of a reply that answers the level of the clock line in the pause;
   /// null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
+  /// For bidirectional clocked links: returns the ranges of bits of this burst that the host sends, in their order.
+  BitRanges (*host_bits)(const Options&, Frame burst) = nullptr;
   /// Returns the alarms that an encoder with these options can report; null: it can report all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
