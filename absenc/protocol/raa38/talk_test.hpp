@@ -39,7 +39,7 @@ struct CommandResult {
   Error error = Error::none;
   std::string words{};   // detail and advice of the error
   std::string fields{};  // "name=value name=value ", without real numbers
-  std::string left{};    // fields that `report_left` reports, as text like `fields`
+  std::string left{};    // fields that the ended conversation gives to `report_left`, as text like `fields`
   std::optional<Reading> reading{};
   Time took{};
 

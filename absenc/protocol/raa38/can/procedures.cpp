@@ -93,7 +93,7 @@ struct PositionResult {
 Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // The words of the error are made here, because the next request replaces the exchange that they quote.
+  // The explanation of the error is made here, because it quotes the last exchange, which the next request replaces.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
@@ -186,7 +186,8 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Accepts a rate near the wanted one, because the adapter may deliver frames in bursts.
+// Compares the measured send rate with the rate that order 31 has requested. A small difference is accepted, because
+// the adapter may deliver frames in bursts.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -210,7 +211,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // If the adapter delivers frames late, the first measurement may be wrong and a repeated one right.
+  // If the adapter delivers frames late, the first measurement of the send rate may be wrong and a repeated one right.
   for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const SendRate heard = co_await count_frames(dialog);
@@ -243,7 +244,8 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// If a node's frame arrives more than this number of requests after the request to the node, it is no answer.
+// A node's frame that arrives more than this number of requests after the request to the node does not count as its
+// answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
