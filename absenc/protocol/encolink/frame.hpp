@@ -107,15 +107,15 @@ struct Format {
 
   /// Returns whether both the resolution and the number of bits of the turns are known.
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
-  /// Returns the number of bytes that the turns take in a frame.
+  /// Returns the number of bytes that a position frame has for the turns: 2, or 0 for a single-turn encoder.
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
-  /// Returns the number of padding bits below the turns.
+  /// Returns the number of padding bits below the turns, which take 16 bits together with this padding.
   [[nodiscard]] constexpr unsigned spare_turns() const {
     return maximum_multiturn_bits - static_cast<unsigned>(multiturn_bits);
   }
   /// Returns the number of bytes of channel 1 (turns and position), without its checksum.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
-  /// Returns the number of bytes of a position frame.
+  /// Returns the number of bytes of a position frame, with its checksum and, if frames have one, its channel 2 byte.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
   /// Returns the number of bytes of a whole cycle of channel 2, which is also its number of frames.
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
@@ -295,7 +295,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return identity;
 }
 
-/// Returns `format` with the resolution of `identity`, and with a number of turn bits that agrees with it.
+/// Returns `format` with the resolution of `identity`. The number of turn bits stays if it agrees with the frame length
+/// in the identity; otherwise it becomes 16 for frames with turns, 0 for frames without.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;
