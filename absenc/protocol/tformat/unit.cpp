@@ -21,10 +21,11 @@ using namespace author;
 
 using Dialog = DialogOf<Protocol>;
 
-// Result of a T-format procedure: the values of its fields, its reading, and the bytes that a field shows.
+// Result of a T-format procedure: the values of its fields, its reading, and the memory bytes that the field `data`
+// reports.
 struct ProcedureResult : Values {
   Reading reading{};
-  ByteBuffer<page_addresses> bytes{};  // memory bytes that the field `data` shows
+  ByteBuffer<page_addresses> bytes{};  // storage of the memory bytes that the field `data` reports
   std::optional<std::uint8_t> selected{};
 };
 
