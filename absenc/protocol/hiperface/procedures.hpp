@@ -14,10 +14,12 @@ namespace absenc::hiperface {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: the values of its fields, a reading, and the bytes that fields show.
+/// Result of a procedure: the values of its fields, a reading, and storage for bytes to which the values refer.
 struct ProcedureResult : Values {
-  Reading reading{};   ///< Position and turns; empty if the procedure read none.
-  FieldBytes bytes{};  ///< Bytes that fields with bytes or text show.
+  Reading reading{};  ///< Position and turns; empty if the procedure read none.
+  /// Storage of the bytes of a data field, or of the characters of a serial number or program version, that are
+  /// reported.
+  FieldBytes bytes{};
 };
 
 /// Converts an argument, whose value is 0 to 255, to a byte.
