@@ -51,7 +51,7 @@ struct Values {
   std::optional<bool> clash{};  ///< Scan: true if no reply of the address was valid and at least one was damaged.
 };
 
-/// Table of the fields of requests, replies and results.
+/// Table of the fields in which requests, replies and results of procedures are reported.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;
