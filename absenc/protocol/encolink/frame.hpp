@@ -68,7 +68,7 @@ enum class Config : std::uint8_t {
 /// Returns whether a byte is a valid first byte of a request.
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
-/// Number of bytes of a request: config and ra (one byte of a register access).
+/// Number of bytes of a request: its purpose (`config`) and one byte of a register access (`ra`).
 inline constexpr std::size_t request_bytes = 2;
 inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity frame, with its checksum.
 /// Number of bytes of an identity frame as the vendor's library reads it.
@@ -348,8 +348,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Returns the reading `now`, completed by alarms of the earlier reading `before` that `now` does not report. They are
-/// added only if the error and warning bits of `now` agree with them.
+/// Returns the reading `now`, completed by alarms of the earlier reading `before` that `now` does not report. These
+/// alarms are added only if the error and warning bits of `now` are those that the alarms of `before` cause.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

@@ -206,8 +206,8 @@ void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome acc
     dialog.refused();
 }
 
-// Writes a register and reads it back. A write that may have been executed is repeated only if the register has another
-// value.
+// Writes a register and reads it back. If a write may have been executed, the host repeats it only if the register has
+// another value than `value`.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =

@@ -94,7 +94,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
-    // A reset of the turns (data ID D) permits clearing multiturn_error only if the alarm was raised before it.
+    // A reset of the turns (data ID D) permits clearing multiturn_error only if the alarm was raised before this reset.
     if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
@@ -104,8 +104,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
   }
-  /// Returns the reply to data ID `id` at the time `now`; it has the values of both channels, also those that `id` does
-  /// not carry.
+  /// Returns the reply to data ID `id` at the time `now`. The reply has the values of both channels, also those that
+  /// replies to `id` do not carry.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const {
     Reply reply{.id = id, .encoder_address = profile_.address};
     reply.one = channel_now(Channel::one, now);

@@ -125,7 +125,7 @@ TEST(EslProbe, ReportedParityErrorShowsTheScope) {
 }
 
 TEST(EslProbe, OpenOptionsAreFirst) {
-  EXPECT_EQ(open_options, 10u);  // README.md names each of these ten options
+  EXPECT_EQ(open_options, 10u);  // README.md names each of the ten options for properties that the document leaves open
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;
 }

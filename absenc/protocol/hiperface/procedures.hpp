@@ -45,7 +45,7 @@ struct ProcedureResult : Values {
 
 /// Reads the position. If the reply has the error bit, also reads the status, to learn whether the position is valid.
 author::Procedure read_position(Dialog& dialog, ProcedureResult& found);
-/// Reads the status until a code comes again or is no alarm, and reports the alarms that the codes name.
+/// Reads the status until a status code comes again or is no alarm, and reports the alarms that the codes name.
 author::Procedure read_status(Dialog& dialog, ProcedureResult& found);
 /// Reads the type label, the serial number and the program version; skips the last two if the encoder refuses them. If
 /// the type needs it, also reads the description in data field FF.

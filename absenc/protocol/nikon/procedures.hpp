@@ -9,7 +9,7 @@ namespace absenc::nikon {
 /// The conversation through which procedures send requests.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: the values of its fields, a reading, and words of the EEPROM.
+/// Result of a procedure: the values of its fields, a reading, and storage of EEPROM words.
 struct ProcedureResult : Values {
   Reading reading{};  ///< Position and turns with their alarms; empty if the procedure read none.
   /// storage of the EEPROM words that the field `data` reports, the low byte of each first

@@ -68,7 +68,7 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   return reading;
 }
 
-/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` reports, as Unit::remembered
 /// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if (now.alarms_reported == 0 && before.alarms != 0) judge(now, before.alarms);

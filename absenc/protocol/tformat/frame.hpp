@@ -360,7 +360,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   return to_reading(format, reply.id, reply, known_alarms);
 }
 
-/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` reports, as Unit::remembered
 /// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   // `now` is the reading of a reply to data ID 3, which reports all alarms

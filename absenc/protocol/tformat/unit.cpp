@@ -31,7 +31,7 @@ struct ProcedureResult : Values {
 
 // ---- Resets (10)
 
-// Returns an error if the positions in these two replies forbid a reset; otherwise no error.
+// Returns an error if the positions in the replies `first` and `second` forbid a reset; otherwise no error.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);

@@ -131,9 +131,9 @@ struct Nodes {
 /// Finds the nodes on the bus by requesting every number from 1 to 255. Errors: timeout, bad_framing.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of `configure`: the result of the setting, and the nodes that were found on the bus before the setting.
+/// Result of `configure`: the values that it reports, and the nodes that were on the bus before the setting was sent.
 struct ConfigureResult : Values {
-  Nodes nodes{};          ///< Nodes that were found on the bus before the setting.
+  Nodes nodes{};          ///< Nodes that were found on the bus before the setting was sent.
   bool verified = false;  ///< Whether the host has verified that the node obeys the setting.
 };
 

@@ -139,7 +139,8 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Both positions after the order must be near 0: the first may be the order's late answer, which equals position 32.
+// Both positions that the host reads after order 20 (zero) must be near 0, because the first may be a late answer to
+// the order: this answer equals the position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -151,7 +152,8 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // The tolerance is twice the usual one, because the shaft may have vibrated before and after the order.
+  // The position may differ by twice the angle that a shaft at rest usually may, because the shaft may have vibrated
+  // both before and after order 22.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -329,7 +331,7 @@ Part<bool> wait_until_over(Dialog& dialog) {
   co_return true;
 }
 
-// Writes a setting to the node. If its answer is lost, the node may nevertheless have obeyed.
+// Writes a setting to the node. If the node's answer is lost, the node may nevertheless have obeyed.
 Part<bool> write(Dialog& dialog, ConfigureResult& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
   co_await wait_until_over(dialog);

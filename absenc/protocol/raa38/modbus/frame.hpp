@@ -287,7 +287,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the probable length in bytes of a reply to `request` of which these first bytes were received.
+  /// Returns the probable length in bytes of the complete reply to `request`; `reply` has the bytes received so far.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
@@ -307,7 +307,7 @@ struct Protocol {
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
-  /// Returns wrong_length if the length is still in doubt after the second reply, otherwise none.
+  /// Returns wrong_length if the length of the first reply is still in doubt after the second reply, otherwise none.
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
   }

@@ -139,8 +139,8 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Reads the address with function A0; ends the command if another address than the format's answers. `baud`: present
-// rate of the line.
+// Reads the address with function A0; ends the command if an encoder answers that has another address than the format.
+// `baud`: present rate of the line.
 Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
