@@ -130,7 +130,8 @@ struct Evidence final : EvidenceSink {
   std::vector<OptionEvidence> all;
 };
 
-// Returns the bit order that a probe of these captures finds, 0 or 1; -1 if they contradict both orders.
+// Returns the value of the option bit_order that a probe of these captures finds, 0 or 1; -1 if the captures contradict
+// both.
 std::int64_t probed(std::span<const Capture> captures, Evidence& evidence, std::string_view settings = "") {
   Options options = author::testing::options_of(unit, settings);
   const auto is_order = [](const Option& option) { return option.name == "bit_order"; };
