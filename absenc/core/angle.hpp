@@ -75,7 +75,7 @@ struct Reading {
 
 /// Returns the angle in degrees, 0 to below 360; a revolution has 2^bits counts, 1 to 64 bits.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  // for many bits the quotient may be rounded up to 360, which is out of range
+  // with more than 48 bits the quotient might be rounded up to 360, so only the upper 48 bits are used
   if (bits > 48) return degrees(counts >> (bits - 48), 48);
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }

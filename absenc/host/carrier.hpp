@@ -70,7 +70,7 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Takes the machine's steps. Call it after something other than an event has changed which step the machine wants.
+  /// Takes the machine's next steps. Call it after the machine was changed by a call instead of an event.
   void wake(Time now) {
     if (is_busy() && !waiting_ && !sending_) take_steps(now);
   }

@@ -412,7 +412,8 @@ Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
     constexpr unsigned longest_frame = 160;
     return line.bits(longest_frame * (step.out.size() + step.expect));
   } else {
-    if (step.answer == Time{} && step.expect != 0) {  // SPI
+    // only a transfer on an SPI link expects items without a time limit for an answer
+    if (step.answer == Time{} && step.expect != 0) {
       return line.select_lead + line.bits(8 * std::max(step.out.size(), step.expect));
     }
     const Time pauses = step.frame != 0 ? static_cast<int>(step.out.size() / step.frame) * step.width : Time{};

@@ -104,7 +104,7 @@ class FirstReading {
   }
 
   [[nodiscard]] constexpr std::uint64_t reach(const Place& place, Time between) const {
-    constexpr std::uint64_t noise = 4;  // noise of a position, in counts
+    constexpr std::uint64_t noise = 4;  // greatest noise of a position that is assumed, in counts
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }

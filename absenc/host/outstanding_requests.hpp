@@ -81,7 +81,8 @@ class OutstandingRequests {
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
-  /// Returns the longest time between consecutive requests since the list was empty, or from the last until `now`.
+  /// Returns the longest time between two consecutive requests since the list was empty, the time from the last request
+  /// until `now` included.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
   /// Removes the entries whose newest request was sent before `before`.
   void remove_older(Time before);

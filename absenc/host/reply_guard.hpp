@@ -68,7 +68,7 @@ class ReplyGuard final : public Machine<Item> {
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // whether to feed a `received` event with the items that arrived
+    bool reply = false;  // whether the conversation is still to get the received items as a `received` event
     bool timeout = false;
     Time received_at{};
   };

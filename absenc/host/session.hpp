@@ -220,7 +220,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // set to true again when the conversation has given its next result
+      streaming_ = false;  // becomes true again below when the conversation has stopped at its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -253,8 +253,9 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // Returns whether the reply guard is used. No reply is late where the host drives the clock; on CAN a conversation
-  // that listens needs all frames.
+  // Returns whether replies to this command pass the reply guard. Where the host drives the clock they do not, because
+  // no reply is late. On CAN only replies to commands that read do, because a conversation that listens needs all
+  // frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return !host_clocks(unit_->link);

@@ -108,7 +108,8 @@ class CompiledWord {
   bool odd_ = false;
   bool gray_ = false;
   std::uint8_t value_count_ = 0;
-  std::array<Part, WordFormat::maximum_fields> values_{};  // the fields whose meaning is Meaning::value
+  // places of the fields that carry other values than position, turns and flags (Meaning::value)
+  std::array<Part, WordFormat::maximum_fields> values_{};
 };
 
 }  // namespace absenc

@@ -168,7 +168,7 @@ class CanPuppet final : public Machine<CanFrame> {
 struct CanLine : testing::Test {
   Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
-  // Returns the log entry of a frame that began `after` us after the start.
+  // Returns the expected log entry of a frame that begins `after` microseconds after the start of the test.
   static std::string seen(std::uint32_t id, std::size_t after) {
     return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
   }

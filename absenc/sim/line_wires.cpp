@@ -116,7 +116,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // the receiver is synchronised to the character of another sender, and the line is not silent
+    } else {  // a receiver synchronised to another sender's character only notices that the line is not silent
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -184,7 +184,8 @@ void Line<Item>::turn_data_line(Node node) {
 template <class Item>
 void Line<Item>::read_driven_bits(const State& host, std::vector<Item>& in) const {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    const std::size_t first = host.clocks_before + host.out_bits;  // clock of the exchange of the first bit
+    // index of the first bit of `in`, counted in clocks of the whole exchange
+    const std::size_t first = host.clocks_before + host.out_bits;
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;
       const BitView driven{other->out, 8 * other->out.size()};

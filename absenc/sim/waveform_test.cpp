@@ -145,7 +145,7 @@ TEST(Waveform, CollisionIsTheAnd) {
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
-  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // the level changes at every bit
+  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // the line changes its level at every bit of this character
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
     edges += "#" + std::to_string(edge) + '\n';
@@ -184,7 +184,7 @@ TEST(Waveform, SpiClockBeginsAfterSelectLead) {
 
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
-  const std::array<std::uint8_t, 1> bits{0x50};  // the word is the three bits 010
+  const std::array<std::uint8_t, 1> bits{0x50};  // the encoder sends the three bits 010
   at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
@@ -198,8 +198,8 @@ TEST(Waveform, ClockedBits) {
 
 TEST(Waveform, DataLineThatTurns) {
   Picture picture(LinkKind::clocked_bidirectional, slow);
-  const std::array<std::uint8_t, 1> host{0x40};    // the bits 01
-  const std::array<std::uint8_t, 1> device{0x20};  // the bits 001
+  const std::array<std::uint8_t, 1> host{0x40};    // the host sends the bits 01
+  const std::array<std::uint8_t, 1> device{0x20};  // the encoder sends the bits 001
   Line<std::uint8_t>::Transfer first{0us, 5us, 5, host, device};
   first.out_bits = 2;
   first.goes_on = true;

@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of characters to look ahead: more than two frames of usual length
+// number of characters that are examined beyond a frame to judge it: more than two frames of usual length
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -157,7 +157,7 @@ bool Annotator::is_refusal(Bytes request, std::size_t from) {
          judge_.decode({.bytes = request}, {.bytes = bytes}) == Error::request_rejected;
 }
 
-// Returns the size of an echo of `request` at index `from` together with the reply or refusal after it, or 0 if there
+// Returns the total size of an echo of `request` at index `from` and the reply or refusal behind the echo; 0 if there
 // is no echo.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
@@ -267,7 +267,7 @@ std::size_t Annotator::bad_size() {
   // In a stream of unsolicited frames a bad frame mostly has the size of the good frames.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // If the run ends with a good unsolicited frame, the bytes before it are the bad ones.
+  // If the run ends with a good unsolicited frame, all bytes before this frame are the bad ones.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;

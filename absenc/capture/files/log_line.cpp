@@ -121,7 +121,7 @@ struct ParsedTime {
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
-  // A comma begins a fraction only before three or six digits.
+  // A comma after the seconds begins a fraction of a second only if three or six digits follow.
   if (seconds && text.substr(size).starts_with(',')) {
     const std::string_view behind = text.substr(size + 1);
     const std::size_t digits = std::min(behind.find_first_not_of("0123456789"), behind.size());

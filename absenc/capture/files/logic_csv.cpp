@@ -241,7 +241,8 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<char> columns_;  // use of each column that is not skipped as time: 1 has logic levels, 0 is left out
+  // for each column except that of the time: 1 if it has the levels of a channel, 0 if it is left out
+  std::vector<char> columns_;
   RowTime clock_ = RowTime::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;

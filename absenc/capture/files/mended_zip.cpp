@@ -14,7 +14,8 @@ namespace absenc::capture {
 
 namespace {
 
-// These numbers are from PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.4.9 and 4.5.3, except `largest_directory`.
+// The constants below are from PKWARE's APPNOTE 6.3.10 (description of the zip format), 4.3.7 to 4.4.9 and 4.5.3,
+// except `largest_directory`.
 constexpr std::uint64_t local_signature = 0x04034B50;
 constexpr std::uint64_t directory_signature = 0x02014B50;
 constexpr std::uint64_t zip64_end_signature = 0x06064B50;

@@ -171,7 +171,8 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Missing upper bits are unknown if the first written bit is unknown, otherwise 0.
+  // Sets the bits of a vector. A vector may be written with fewer bits than it has: the missing upper bits are unknown
+  // if the first written bit is unknown, otherwise 0.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {

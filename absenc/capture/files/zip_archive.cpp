@@ -96,7 +96,8 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Returns a limit for the compressed size: deflate adds only few bytes to data that cannot be compressed.
+// Returns a limit for the compressed size of `size` bytes: deflate adds only few bytes to data that cannot be
+// compressed.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace

@@ -65,7 +65,8 @@ TEST(Clocked, SsiWordsEndAtPauses) {
   EXPECT_EQ(all.outcome.problem, "");
   EXPECT_EQ(all.outcome.pause, 12u);
   ASSERT_EQ(all.bursts.size(), 3u);
-  // The first falling edge samples the idle line, so each burst has one bit more than the word.
+  // At the first falling edge of the clock the decoder samples the idle data line, so each burst has one bit more than
+  // the word.
   EXPECT_EQ(all.bursts[0].bits, 13u);
   EXPECT_EQ(all.bursts[0].in, (std::vector<std::uint8_t>{0x8F, 0x78}));
   EXPECT_EQ(all.bursts[1].in, (std::vector<std::uint8_t>{0xD2, 0xD0}));

@@ -17,7 +17,7 @@ struct GeneratedCheck {
   CrcParameters parameters{};
   bool low_first = true;
   bool padded = false;
-  std::size_t first = 0;     // number of bytes before the covered part
+  std::size_t first = 0;     // number of bytes in front of the bytes that the checksum covers
   std::size_t covered = 8;   // number of bytes that the checksum covers
   std::size_t trailing = 0;  // number of bytes behind the checksum
 };
@@ -99,7 +99,7 @@ TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
 TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   std::mt19937 random(3);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .first = 1}, 6, random);
-  // with an init of 0, a first byte of zero does not change the CRC
+  // the init of this CRC is 0, so a first byte 00 does not change the CRC, whether the CRC covers it or not
   for (CheckedFrame& frame : frames) frame.bytes.front() = 0;
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());

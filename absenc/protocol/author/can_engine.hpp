@@ -89,13 +89,13 @@ class CanEngine : public Conversation<CanFrame> {
   bool disturbed_ = false;
   bool receives_early_ = false;
   bool early_ = false;
-  bool listens_ = false;  // frames are received without a request
+  bool listens_ = false;  // true: the host only receives frames, without a request
   std::uint32_t rate_ = 0;
   CanFrame request_{};
   CanFrame relevant_{};
   Time silence_{};   // receiving ends after this time without any frame; 0: receiving lasts exactly `duration_`
   Time duration_{};  // longest duration of receiving
-  Time since_{};     // frames that were complete before this time are early (see `overhear`)
+  Time since_{};     // frames that were complete before this time are delivered only after `overhear`
   Time until_{};     // end of receiving; before the request is sent: earliest time to send it
   Time sent_at_{};
   Time relevant_at_{};

@@ -35,8 +35,8 @@ class ClockedEngine : public Conversation<std::uint8_t> {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
-  /// Returns the time of the first clock edge of the last transfer; without a known clock rate, the earliest possible
-  /// time.
+  /// Returns the time of the first clock edge of the last transfer; if the clock rate is not known, the earliest time
+  /// at which this edge is possible.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the time at which the last transfer was received completely.
   [[nodiscard]] Time received_at() const { return received_at_; }

@@ -30,7 +30,8 @@ concept Clocked = requires {
 };
 
 struct Later {};
-/// Argument of the constructor of ClockedHostOf: the host begins no transfer until its subclass begins one.
+/// Argument of the constructor of ClockedHostOf that selects a host without a first transfer: its subclass begins the
+/// first one.
 inline constexpr Later later{};
 
 /// A conversation on a clocked line with decoded replies; a subclass handles the bits.

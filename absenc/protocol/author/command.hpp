@@ -48,7 +48,7 @@ struct ItemOf<P> {
 };
 }  // namespace detail
 
-/// The item that the line of the protocol `P` carries: `P::Item`, or else a byte.
+/// C++ type of the items that the line of the protocol `P` carries: `P::Item`, or a byte if `P` declares none.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
@@ -79,7 +79,7 @@ struct Report {
   /// Writes the detail of the error of `host`, used instead of the details that `explain` and `explain_host` return.
   /// Null: their details are used.
   void (*tell)(Sentence&, const Host& host) = nullptr;
-  /// Advice for the error that the line is never silent.
+  /// Advice for people when an error is reported because the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
@@ -192,7 +192,7 @@ constexpr bool asks_by_pulse(const typename P::Format& format, const typename P:
   return P::manner(format, request).pulse != Time{};
 }
 
-/// Empty request, for protocols whose host sends nothing but clocks.
+/// C++ type of an empty request, for protocols whose host sends nothing but clocks.
 struct NoRequest {};
 
 /// Declaration of a command: its description, its request, and the conversation that executes it.
@@ -224,7 +224,7 @@ struct CommandOf {
     one.missing = why;
     return one;
   }
-  /// Returns a copy that is possible only for formats for which `is_possible` is true.
+  /// Returns a copy of this command that is possible only for formats for which `is_possible` returns true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;

@@ -21,7 +21,8 @@ class ReadConfirmed : public HostOf<P> {
     this->ask(request);
   }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // `reading_` is set only if no error occurred
+    // the result is `reading_`, which is set only if no error occurred
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:

@@ -94,13 +94,13 @@ class Engine : public Conversation<std::uint8_t> {
   void emit() { emitting_ = true; }
   /// Sets that this end of the line is next switched to `rate` bits per second; 0: the rate stays.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
-  /// Replaces the time limits, for example after a change of the rate.
+  /// Replaces the host's time limits and pauses, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sets that nothing is sent until `time`, and that `woken` is then called.
   void sleep(Time time);
   /// Sets that the host listens for `duration` without sending; `heard` gets the received bytes.
   void listen(Time duration);
-  /// Continues to listen until the end of the time. To be called after `heard`.
+  /// Continues to listen until the duration given to `listen` is over. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
   /// Sets that the conversation ends with `error`, at the earliest `hold` after `received_at()`.
   void finish(Error error, Time hold = {});

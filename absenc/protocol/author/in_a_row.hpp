@@ -33,7 +33,8 @@ class RowCounter {
   /// Constructs a counter. `row` and `rules` must outlive it.
   RowCounter(const InARow& row, HostRules& rules) : row_(&row), rules_(&rules) {}
 
-  /// Counts a request of the command `code`, received from `earliest` to `at`. Returns whether to execute it now.
+  /// Counts a request of the command `code` that was delivered at `at` and may have arrived as early as `earliest`.
+  /// Returns whether the encoder executes the command now.
   [[nodiscard]] bool count(unsigned code, Time at, Time earliest) {
     if (code != code_) end();
     code_ = code;

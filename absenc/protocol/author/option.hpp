@@ -18,7 +18,7 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
-// Returns the value of an option for a member of the format; a time gives nanoseconds.
+// Converts the value of a format's member to the value of its option; a duration becomes its number of nanoseconds.
 template <class Value>
 constexpr std::int64_t number_of(const Value& value) {
   if constexpr (requires { value.count(); }) {

@@ -25,7 +25,8 @@ struct Outcome {
   Error error = Error::none;  ///< Why the procedure failed; `Error::none`: it succeeded.
   std::string_view detail{};  ///< the step that failed, and the evidence
   std::string_view advice{};  ///< what to try, instead of the error's own advice
-  Time hold{};                ///< how long the encoder must not be disturbed after the last sent or received character
+  /// time after the last sent or received character in which nothing may disturb the encoder
+  Time hold{};
   /// True: the explanation of the last reply is not added to `detail` and `advice`.
   bool alone = false;
 };
@@ -93,7 +94,7 @@ class Routine {
   /// Handles the end of the whole procedure, also if a part ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
-  /// Resumes the coroutine whose awaited result is available.
+  /// Resumes the coroutine that waits for a result which is now available.
   void resume() {
     next_ = current_;
     while (next_) {

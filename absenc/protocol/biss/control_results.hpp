@@ -71,7 +71,7 @@ struct ControlResults {
   std::optional<std::uint8_t> address{};  ///< Address of the first register that was accessed, 0 to 127.
   std::optional<std::uint8_t> value{};    ///< Value of the only or first register that was accessed.
   ByteBuffer<control_most> bytes;         ///< Values of successive registers.
-  bool has_data = false;                  ///< Whether `bytes` is reported.
+  bool has_data = false;                  ///< Whether the results include `bytes`, the values of successive registers.
   /// Numbers of frames by which the encoder delayed each byte; empty if they are not known.
   NumberList start_delay;
   std::optional<bool> next_address_accepted{};  ///< Whether the register after the last one may be accessed (P = 0).
@@ -81,7 +81,7 @@ struct ControlResults {
   NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
   std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
-  /// Whether the register was written; false: it had this value already.
+  /// Whether the register was written; false: the register already had the value to be written.
   std::optional<bool> written{};
   /// True: the encoder refused to read the register; otherwise no value.
   std::optional<bool> missing{};
@@ -90,7 +90,8 @@ struct ControlResults {
   std::optional<std::uint64_t> serial_number{};  ///< Serial number of the encoder.
   ByteBuffer<6> device_id;                       ///< Device ID of the encoder, six bytes; empty if it was not read.
   MakerName manufacturer;                        ///< Manufacturer's two characters; empty if they were not read.
-  Reading reading{};                             ///< Stays empty, because these procedures do not report a position.
+  /// Position of the encoder; stays empty, because these procedures do not report one.
+  Reading reading{};
 };
 
 namespace shown {

@@ -28,7 +28,7 @@ using Samples = author::DrivenBits;
 /// Delays the samples of SLO as the line between encoder and host does.
 class LineDelay {
  public:
-  /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
+  /// Delays `samples` by `behaviour.line_delay`; `period` is the period of MA at which they were taken.
   void apply(const Behaviour& behaviour, Time period, Samples& samples);
 
  private:
@@ -55,7 +55,8 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // a frame that does not fit is sent without a start bit
+    // an encoded frame for which `samples` has no room is sent without a start bit
+    if (!encode(format_, reply, samples, data_off_)) {
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);

@@ -54,12 +54,12 @@ class Timeout {
     if (code_ == is_adaptive) return Time(one_and_a_half(period));
     return Time((code_ != 0 ? code_ : 40u) * 500u);
   }
-  /// Returns whether all members are equal.
+  /// Returns whether two timeouts are equal.
   friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
 
  private:
   static constexpr std::uint8_t is_adaptive = 1;
-  // 32 bits suffice: with the lowest `ma_khz` a period is 100 us.
+  // 32 bits are enough for one and a half periods, because the longest period of MA, at the lowest `ma_khz`, is 100 us.
   static constexpr std::uint32_t one_and_a_half(Time period) {
     const auto clock = static_cast<std::uint32_t>(period.count());
     return clock + clock / 2;
@@ -119,7 +119,8 @@ struct Format {
 /// Returns the number of bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// Returns the number of ACK bits, at least 1. Both arguments are at most a second.
+/// Returns the number of ACK bits, at least 1, that an encoder sends which needs the time `latency` for its position,
+/// at the clock period `period`. Both times are at most a second.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());

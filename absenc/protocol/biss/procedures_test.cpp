@@ -196,7 +196,7 @@ TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // The first late frame had too few clocks, so the second and third are compared.
+  // The first late frame had too few clocks, so the host compares the delays of the second and third frame.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

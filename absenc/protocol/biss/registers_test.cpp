@@ -40,7 +40,7 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
   return text == nullptr ? usual : static_cast<std::uint32_t>(std::atoll(text));
 }
 
-// number of frames for the next host; global, because a procedure starts in a constructor
+// Number of frames after which the next host ends; a global variable, because a procedure starts in a constructor.
 std::uint32_t limit = 0;
 
 /// Counters of a host's register accesses, and the register values that the host relies on.
@@ -49,7 +49,7 @@ struct HostRecord {
   std::uint32_t reads = 0;
   std::uint32_t writes = 0;
   std::uint32_t failures = 0;
-  std::uint32_t wrong = 0;  // number of accepted bytes with a wrong value
+  std::uint32_t wrong = 0;  // number of register values that the host read without an error although they were wrong
   std::array<bool, registers::bank_size> read{};
   std::array<bool, registers::bank_size> written{};
   std::array<std::uint8_t, registers::bank_size> known{};
@@ -209,7 +209,7 @@ TEST(BissRegisters, ReadsEveryPositionDuringRegisterAccess) {
   const HostRecord& record = host.machine.found();
   EXPECT_EQ(host.machine.error(), Error::none);
   EXPECT_GE(seen.frames, frames_wanted());
-  EXPECT_EQ(seen.positions, seen.frames);  // no position is missed
+  EXPECT_EQ(seen.positions, seen.frames);  // each frame gave a position
   EXPECT_EQ(seen.wrong, 0u);
   EXPECT_EQ(seen.gaps, 0u);
   EXPECT_EQ(seen.violations, 0u);

@@ -158,7 +158,7 @@ Outcome failure(const Dialog& dialog, Error error) {
 }
 
 Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
-  Outcome bad = done;  // outcome of the last invalid frame
+  Outcome bad = done;  // outcome of the last invalid frame, returned if no clock gave good frames only
   if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;

@@ -59,7 +59,8 @@ TEST(E201Read, RefusesContradictingOptions) {
     EXPECT_EQ(made(settings, "position"), readable) << settings;
     EXPECT_EQ(made(settings, "clock-sweep"), readable);
     EXPECT_TRUE(made(settings, "info"));
-    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is not a clock number or frequency
+    // the argument of set-clock, 20, is neither the number of a clock nor a frequency
+    EXPECT_FALSE(made(settings, "set-clock"));
     EXPECT_EQ(unit.device(author::testing::options_of(unit, settings), shaft, device_storage).bytes != nullptr, usable);
   }
 }

@@ -38,7 +38,8 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // Without extra clocks, `decode` accepts the word read once or twice.
+  // If the format has no extra clocks, `decode` accepts the bits of one word, and also those of the same word sent
+  // twice.
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
