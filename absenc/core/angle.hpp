@@ -35,7 +35,8 @@ struct Reading {
   bool multiturn_valid = false;        ///< Whether the number of revolutions in `multiturn` can be trusted.
   /// true: it is known whether `singleturn` is valid; false: it is not, so `singleturn` must not be used
   bool singleturn_known = true;
-  bool multiturn_known = true;  ///< true: it is known whether `multiturn` is valid
+  /// true: it is known whether `multiturn` is valid; false: it is not, so `multiturn` must not be used
+  bool multiturn_known = true;
   /// true: the encoder counts turns below zero, and `multiturn` is in two's complement
   bool multiturn_signed = false;
   double unit_um = 0;        ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder

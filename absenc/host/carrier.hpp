@@ -178,7 +178,7 @@ class Carrier {
     }
   }
 
-  // greatest number of received characters that are gathered
+  // greatest number of received characters that are gathered before they are delivered
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
   // Members that are used for every received character come first, so that short instructions can address them.

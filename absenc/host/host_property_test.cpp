@@ -43,7 +43,7 @@ RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::in
   unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
   const std::int64_t offset = unwrapper.position() - position;
   for (int i = 1; i <= 200; ++i) {
-    // Steps go from minus half the range up to one count below half the range.
+    // The distance between two positions goes from minus half the counted range up to one count below half this range.
     position += *rc::gen::weightedOneOf<std::int64_t>(
         {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
     RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);

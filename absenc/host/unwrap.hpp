@@ -128,7 +128,8 @@ class Unwrapper {
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // the number is unsigned, so that its wrap after 2^63 counts is defined
+  // the continuous position, stored as an unsigned number, so that its wrap after 2^63 counts is defined
+  std::uint64_t position_ = 0;
   Reading last_{};
   LatchTime last_at_{};
 };

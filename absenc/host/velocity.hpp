@@ -32,7 +32,7 @@ class Velocity {
   /// A window this many times as long as `window` is used even if its speed is less certain.
   static constexpr int longest_windows = 20;
 
-  /// Longest time for `window`; a longer one is reduced to it.
+  /// Longest duration that can be desired as `window`; a longer one is reduced to it.
   static constexpr Time longest_window = std::chrono::minutes(2);
 
   /// Makes the calculation. `window`: desired time over which the speed is measured, above 0.
@@ -192,7 +192,7 @@ class Velocity {
     size_ -= count;
   }
 
-  // Selects the shortest window whose speed has a low enough uncertainty.
+  // Selects the shortest window of positions whose speed has a low enough uncertainty.
   constexpr void choose_start() {
     Time longer = size_ > 1 ? span(size_ - 2) : Time{};
     for (std::size_t i = size_ - 1; i-- > 0;) {

@@ -64,7 +64,7 @@ class CompiledWord {
   }
 
  private:
-  // The place of a field in the number that has the word.
+  // The place of a field in the number whose bits are those of the word.
   struct Part {
     std::uint64_t mask = 0;
     std::uint8_t shift = 0;

@@ -38,8 +38,8 @@ struct StreamCounts {
 /// Whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
-  yes,      ///< the request was sent, or possibly sent
-  refused,  ///< the request was sent, but the encoder refused it, or reading back shows no change
+  yes,      ///< a request that changes the encoder was sent, or possibly sent
+  refused,  ///< such a request (see `yes`) was sent, but the encoder refused it, or reading back shows no change
 };
 
 /// Host side of one command. Its result, at the step `emit` or `done`, is valid until the next call of `feed` or

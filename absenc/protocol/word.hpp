@@ -337,7 +337,7 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
   const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
-  if (bits.multiturn_first) format.add(turns);  // `add` refuses a field of 0 bits
+  if (bits.multiturn_first) format.add(turns);  // a part of 0 bits is left out, because `add` refuses a field of 0 bits
   format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;

@@ -263,7 +263,7 @@ TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   }
   line.run_until(microseconds(1000));
   EXPECT_EQ(device.received.size(), 2u);
-  EXPECT_EQ(exchange().size(), 8u);  // the request after the ignored one is answered again
+  EXPECT_EQ(exchange().size(), 8u);  // the device answers the request that follows the ignored request
 }
 
 TEST_F(Faults, EarlyRequestIsAViolation) {

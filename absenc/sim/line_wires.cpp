@@ -203,7 +203,7 @@ void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
     std::vector<Item>& in = transferred_in_;
-    in.assign(host.expect, 0xFF);  // a line that no device drives is pulled up
+    in.assign(host.expect, 0xFF);  // a data line that no device drives is pulled up to 1
     Time low_after{};
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;

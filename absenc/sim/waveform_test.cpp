@@ -282,7 +282,7 @@ TEST(Waveform, PassesSettledChangesToSink) {
   device.send({0x55, 0x00, 0x55, 0x00}, 14us);
   line.attach(NodeRole::host, host);
   line.attach(NodeRole::device, device);
-  line.run_until(45us);  // this time lies within the fourth character of both senders
+  line.run_until(45us);  // at this time both senders are sending their fourth character
   EXPECT_EQ(line.settled(), 40us);
   EXPECT_EQ(counter.last, 33us);
   EXPECT_EQ(counter.commented, 30us);

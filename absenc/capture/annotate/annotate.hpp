@@ -66,7 +66,7 @@ class Annotator {
     // false: no pause was seen yet, so the first run may begin within a frame and is reported as cut (unused with
     // arrival times)
     bool synchronised = false;
-    bool at_frame_start = false;  // the next character to parse is taken as the begin of a frame
+    bool at_frame_start = false;  // true: the next character to parse is taken as the begin of a frame
     // size of the last good unsolicited frame of this run; with arrival times a reply sets it to 0
     std::size_t last_size = 0;
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none

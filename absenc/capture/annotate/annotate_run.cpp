@@ -282,7 +282,7 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
-  // A damaged reply may still have its usual length, with a pause after it.
+  // A damaged reply may still have the usual length of a reply to this request, with a pause after it.
   if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
     const std::size_t usual = reply_sizes_[size_index(exchanges_.waiting()[*pending].bytes())];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {

@@ -58,7 +58,7 @@ bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    // each UTF-8 sequence in the text counts as one character
+    // each character of the text, even of several bytes in UTF-8, stands for one logged byte
     if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
@@ -114,7 +114,7 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
 
 struct ParsedTime {
   std::optional<Instant> at;
-  std::size_t size = 0;  // number of characters of the line that state the time
+  std::size_t size = 0;  // number of characters at the beginning of the line that state the time
 };
 
 // Returns the number of characters at the beginning of `text` that may be a clock time like "17:55:24.123".

@@ -85,7 +85,7 @@ class LogicCsv final : public ParsedReader {
     levels_->begin(block);
     const std::uint64_t begin = lines_.offset();
     const Tick first = at_;
-    // All level changes of one time must be in one block.
+    // Level changes with the same time must be in the same block.
     Tick last = first;
     do {
       if (at_ != last && lines_.offset() - begin >= text_at_once) {

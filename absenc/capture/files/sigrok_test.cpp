@@ -342,7 +342,8 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // the first piece has 333 samples and one byte, which is lost
+  // the first piece has 333 whole samples and one byte of the next sample, which is lost
+  EXPECT_EQ(count(second - 40), 333u);
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);

@@ -202,9 +202,9 @@ class VcdReader final : public ParsedReader {
   std::string vector_;
   std::uint64_t index_ = 0;
   Tick now_ = 0;
-  bool started_ = false;  // a time or a value change has been read
-  bool valued_ = false;   // a value change has been read
-  bool initial_ = true;   // all values read so far are at the time of the first one, so they are initial levels
+  bool started_ = false;  // true: a time or a value change has been read from the file
+  bool valued_ = false;   // true: a value change has been read from the file
+  bool initial_ = true;   // true: all values read so far have the time of the first one, so they are initial levels
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

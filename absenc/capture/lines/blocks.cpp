@@ -33,7 +33,7 @@ void LevelReader::expand(Block& block, Levels& levels) const {
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       const auto same = std::find(channels_.begin(), channels_.end(), channels_[i]) - channels_.begin();
       if (static_cast<std::size_t>(same) == i) {
-        // the changes are swapped, so that both vectors keep their storage
+        // the changes are swapped and not copied, so that both vectors keep their storage
         std::swap(levels.changes[i], block.changes[channels_[i]]);
       } else {
         levels.changes[i] = levels.changes[static_cast<std::size_t>(same)];

@@ -97,7 +97,8 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
     ClockedDrawing drawing;
     drawing.idle(20, idle_clock);
     drawing.spi(0x12, 0xF1);
-    drawing.hold(idle_clock, true, true, false, 60);  // the clock pauses within the exchange, which does not end it
+    // the clock pauses here while chip select is active, which does not end the burst
+    drawing.hold(idle_clock, true, true, false, 60);
     drawing.spi(0x34, 0x0E);
     drawing.idle(10, idle_clock);
     drawing.hold(!idle_clock, true, true, true, 4);  // a clock for another chip, while chip select is inactive

@@ -31,11 +31,12 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// The evidence for a protocol that captured exchanges give.
+/// How strongly captured exchanges prove that an encoder uses a protocol.
 struct Evidence {
-  std::size_t tried = 0;      // number of exchanges that were examined
+  std::size_t tried = 0;      // number of captured exchanges that were examined
   std::size_t explained = 0;  // number of exchanges with a good reply
-  std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
+  // number of good exchanges that differ from each other, because a repeated one proves no more
+  std::size_t distinct = 0;
   /// log10 of the probability that the unit would accept as many random frames as good.
   double frames = 0;
   /// log10 of the chance that random positions move as little as these; empty: no position changed

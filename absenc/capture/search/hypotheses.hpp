@@ -15,7 +15,8 @@ struct Hypothesis {
   Options options{};
   Evidence evidence{};
   std::size_t tried = 1;  // number of hypotheses that were tried, including this one: each may match by chance
-  bool at_least = false;  // true: the encoder may have more bits than `options` state
+  // true: the encoder may have more position or turns bits than `options` state, because frames do not show it
+  bool at_least = false;
 
   /// Returns log10 of the probability that at least one of `tried` hypotheses fits this well by chance.
   [[nodiscard]] double chance() const;

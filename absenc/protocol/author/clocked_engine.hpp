@@ -28,7 +28,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts no fields; the subclass Reported (command.hpp) puts them.
+  /// Puts no fields of a result; the subclass Reported (command.hpp) overrides this function and puts them.
   void report(FieldSink&) const override {}
   /// Returns the bits of the last transfer, as bytes, and its times.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {

@@ -15,7 +15,7 @@
 
 namespace absenc::author {
 
-/// A conversation that has already ended with an error.
+/// A conversation that sends nothing, because it has ended with an error from the start.
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
@@ -64,7 +64,7 @@ struct Report {
   using Request = typename P::Request;
   /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
-  /// Items that the line carries.
+  /// C++ type of the items that the line carries: bytes or CAN frames.
   using Items = std::span<const ItemOf<P>>;
 
   /// Puts the fields of a request into the sink. The template `put_values` makes such a function.
@@ -103,7 +103,7 @@ struct Finding {
   std::string_view (*left)(const T&) = nullptr;
 };
 
-/// Puts the fields of the struct that `values(what...)` returns into `sink`.
+/// Calls `values(what...)`, which returns a struct, and puts the fields of this struct into `sink`.
 template <const auto& fields, auto values, class... What>
 constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));

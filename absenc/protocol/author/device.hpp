@@ -45,7 +45,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   void power_off(Time now) override;
 
  protected:
-  /// Constructs an encoder that replies with these times.
+  /// Constructs an encoder that keeps the times `times`, such as that from a request to its reply.
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
@@ -115,8 +115,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
-  Time turns_end_{};          // bytes received before this time are replies of other encoders
+  Time turns_{};  // duration of the replies of all encoders to the present request; 0: only one answers
+  // bytes received before this time belong to replies of other encoders to a request for all
+  Time turns_end_{};
   ByteBuffer<64> stored_;     // bytes received during the present transmission, if DeviceTimes::keeps_requests is true
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
   // Number of consecutive transmissions, before the present one, during which a request was received.

@@ -36,9 +36,9 @@ struct HostTimes {
 /// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
   unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
-  Time pause{};               ///< pause before a repetition; the pauses of HostTimes hold for it, too
+  Time pause{};               ///< pause before a request is repeated; the pauses of HostTimes are kept, too
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
-  /// Whether a reply is checked only after the silence that follows it.
+  /// Whether the host checks a reply only after the silence that follows the reply.
   bool ends_by_silence = false;
   /// Whether the content of the reply is not checked, and a missing reply is no error.
   bool any_reply = false;

@@ -52,14 +52,14 @@ class RowCounter {
     if (sent_ > 0 && sent_ < row_->requests) rules_->note(false, row_->number_rule);
     forget();
   }
-  /// Forgets the row, after a damaged request or at power off.
+  /// Forgets the requests counted so far, after a damaged request or at power off.
   void forget() { sent_ = counted_ = 0; }
 
  private:
   const InARow* row_;
   HostRules* rules_;
   unsigned code_ = 0;
-  unsigned sent_ = 0;  // number of requests in the present row
+  unsigned sent_ = 0;  // number of equal requests received in the present row
   // Number of requests that count for the next execution; a request that is sent too fast restarts this count at 1.
   unsigned counted_ = 0;
   Time since_{};

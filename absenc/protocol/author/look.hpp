@@ -29,7 +29,7 @@ namespace absenc::author {
 /// The last exchange that `look` stored.
 template <class P>
 struct Looked {
-  typename P::Request request{};  ///< The request that was sent.
+  typename P::Request request{};  ///< The request for the position that was sent.
   typename P::Reply reply{};      ///< The valid reply to the request.
   Reading reading{};              ///< The reading of the reply, with the times of the exchange.
 };

@@ -27,7 +27,7 @@ constexpr std::int64_t number_of(const Value& value) {
     return static_cast<std::int64_t>(value);
   }
 }
-// Finds the type among `One` and `Others` that derives from all others.
+// Finds, among the types `One` and `Others`, the one that derives from all others.
 template <class One, class... Others>
 struct MostDerived {
   using Type = One;

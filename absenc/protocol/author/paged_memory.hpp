@@ -18,8 +18,8 @@ struct PagedMemory {
   /// Address that selects pages: writing it selects a page, reading it returns the selected page.
   std::uint8_t select_address;
   std::uint8_t start_page;  ///< Page that is selected after power on.
-  Time page_time;           ///< How long the memory is busy after a page change.
-  Time write_time;          ///< How long the memory is busy after a write, except of an immediate byte.
+  Time page_time;           ///< Time for which the memory is busy after a page change.
+  Time write_time;          ///< Time for which the memory is busy after a write, except a write of an immediate byte.
   /// Shortest time from fetching a byte to reading it; 0: bytes are read without fetching.
   Time fetch_time{};
   /// Whether a page change ends the busy time that a write began, and a write the busy time that a page change began;

@@ -69,7 +69,7 @@ class Routine {
 
   /// Notes that requests from now on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
-  /// Notes that the encoder has not changed since `changes` was called.
+  /// Notes that the request after the call of `changes` has not changed the encoder.
   void refused() { change_ = ChangeSent::refused; }
   /// Returns what `changes` or `refused` noted last; `no` if neither was called.
   [[nodiscard]] ChangeSent change() const { return change_; }
@@ -91,7 +91,7 @@ class Routine {
   explicit Routine(std::span<std::byte> arena) : arena_(arena) {}
   ~Routine() = default;
 
-  /// Handles the end of the whole procedure, also if a part ended it.
+  /// Handles the end of the whole procedure, whether the procedure itself or one of its parts ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
   /// Resumes the coroutine that waits for a result which is now available.

@@ -14,7 +14,7 @@ namespace absenc::biss {
 
 /// Argument: address of a register.
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
-/// Argument: bank that addresses 0 to 63 belong to.
+/// Argument: bank in which the addresses 0 to 63 are accessed.
 inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
 /// Arguments of `memory-read`.
 inline constexpr std::array<Argument, 3> read_arguments{
@@ -55,7 +55,7 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-/// Option of all BiSS units: the clock.
+/// Option of all BiSS units: rate of the clock MA in kHz.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
 /// Values of the two options from which the BiSS timeout is made.

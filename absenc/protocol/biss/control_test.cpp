@@ -367,7 +367,8 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   };
   EXPECT_EQ(answered(written(0x5A), write.cds), Error::none);
   EXPECT_EQ(answered(written(0xA5), write.cds), Error::unexpected_reply);
-  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // CDS is 1 before any request
+  // the first CDS bit is 1, before the host has sent a request
+  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);
 }
 
 TEST(BissControl, SlaveDoesNotStoreByteWithWrongCrc) {

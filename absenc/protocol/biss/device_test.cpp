@@ -113,7 +113,8 @@ unsigned good_frames(Time line_delay, Time period) {
 TEST(BissDevice, LineDelayCorruptsFramesAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
-  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // each sample is taken at an edge, so it reads the old bit or the new bit
+  // each sample is taken when the delayed line just changes, so it reads the old bit or the new bit
+  EXPECT_LT(good_frames(300ns, 315ns), 20u);
   EXPECT_LT(good_frames(300ns, 290ns), 20u);
   // the line delays the bits by a whole clock, so SLO seems to go low one sample late
   EXPECT_EQ(good_frames(300ns, 227ns), 0u);

@@ -182,7 +182,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Decodes the bits before the data, and checks that `size` bits follow.
+// Decodes idle bits, ACK, start bit and CDS, which precede the data, and checks that `size` bits of data follow.
 template <class ReplyType>
 constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -222,7 +222,7 @@ constexpr auto decode_by(const Source& source, const BitView& samples, Cds cds) 
   return result;
 }
 
-// The samples before the data of a frame without errors.
+// The numbers of samples before the data of a frame that has no error.
 struct Head {
   unsigned idle = 0;      // number of samples before the ACK
   unsigned ack_bits = 0;  // number of zeros between the idle samples and the start bit

@@ -121,7 +121,7 @@ constexpr Format turns{.word = "multiturn:16 position:32 error:1! warning:1!"_wo
 constexpr Format behind{.word = "position:13 multiturn:51 warning:1 gray parity:1!"_word};
 constexpr Format values{.word = "position:20 temperature=value:8 error:1 skip:3 warning:1!"_word};
 constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
-// Formats with other CRCs, and with a long word.
+// Formats whose CRC is not the usual one of 6 bits, and a format with a long word.
 constexpr Format other_crc{.word = "position:24 error:1! warning:1!"_word, .check = {8, 0x97}};
 constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check = {16, 0x90D9, 0x1234, false, false}};
 constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};

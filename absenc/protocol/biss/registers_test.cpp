@@ -80,7 +80,8 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, HostRecord& record) {
       const Error written = co_await write_register(dialog, master, address, value);
       ++record.writes;
       if (written != Error::none) ++record.failures;
-      is_known[address] = written == Error::none;  // after a failed write the value is unknown
+      // after a failed write the host does not know the value of the register
+      is_known[address] = written == Error::none;
       known[address] = value;
       record.written[address] = record.written[address] || is_known[address];
     }
@@ -230,7 +231,7 @@ TEST(BissRegisters, FaultsCauseNoWrongRegisterByte) {
   const HostRecord& record = host.machine.found();
   EXPECT_GT(seen.damaged, seen.frames / 500);
   EXPECT_EQ(seen.positions + seen.bad_frames, seen.frames);
-  EXPECT_LE(seen.bad_frames, seen.damaged);  // not more frames are rejected than were damaged
+  EXPECT_LE(seen.bad_frames, seen.damaged);  // the host rejected at most as many frames as were damaged
   EXPECT_EQ(seen.gaps, 0u);
   const auto times = [&seen](sim::FaultKind kind) {
     return static_cast<double>(seen.faults[static_cast<std::size_t>(kind)]);

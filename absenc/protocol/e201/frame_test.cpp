@@ -33,7 +33,7 @@ TEST(E201Frame, DistinguishesErrorsOfSamples) {
            {"80014328ff300000\r", Error::bad_framing},     // the bits of the frame begin with 1 0 0 instead of 1 1 0
            {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
            {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated
-           {"c0014328ff310000\r", Error::none},            // a bit after the CRC has changed
+           {"c0014328ff310000\r", Error::none},            // a sample behind the CRC is flipped, which is no error
            {"c0014328fe300000\r", Error::bad_checksum},
        })) {
     EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;

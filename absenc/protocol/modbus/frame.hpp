@@ -20,7 +20,7 @@ inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x
 inline constexpr std::size_t frame_capacity = 256;
 inline constexpr std::size_t shortest_frame = 4;  ///< Length of the shortest frame in bytes: address, function, CRC.
 inline constexpr std::size_t crc_size = 2;        ///< Length of the CRC in bytes.
-/// Bytes of one frame.
+/// Buffer for the bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
 
 inline constexpr std::uint8_t first_address = 1;   ///< Lowest address of a server; 0 is broadcast and never answered.

@@ -109,7 +109,7 @@ struct Bench {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::optional<std::size_t> host;
   Wire last_reply;             // last reply that `ask` received
-  std::vector<Time> silences;  // durations of all silences on the line that were longer than a character
+  std::vector<Time> silences;  // durations of all silences on the line that were longer than the time of a character
   Time last_end{};
 };
 
@@ -249,7 +249,7 @@ TEST(ModbusLine, ServerChangesRateAfterReply) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-// If bytes that are no reply arrive without a pause, the client stops.
+// If bytes that are no reply arrive without a pause, the client ends its conversation.
 TEST(ModbusLine, ClientStopsOnEndlessNoise) {
   ToyClient client(request_body);
   Time now{};

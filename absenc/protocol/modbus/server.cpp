@@ -41,7 +41,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
-  // A frame that does not end with its CRC is not complete.
+  // A frame whose last two bytes are not its CRC is not complete, so the server waits for more bytes.
   if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;
   return step;
 }

@@ -33,7 +33,7 @@ class CompiledFormat;
 struct Format {
   using Compiled = CompiledFormat;           ///< The format compiled (compiled_format.hpp), to decode many words.
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
-  AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
+  AfterWord after_word = AfterWord::repeat;  ///< Bits that the encoder sends if the host clocks on after the word.
   /// Number of clocks after the word, whose bits are compared with `after_word`.
   unsigned extra_clocks = 0;
   Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
@@ -48,7 +48,7 @@ struct Format {
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
   /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`.
   Time monoflop = 20us;
-  std::uint32_t slowest_khz = 100;  ///< Slowest clock that the virtual encoder allows, in kHz.
+  std::uint32_t slowest_khz = 100;  ///< Slowest clock in kHz that the virtual encoder accepts from a host.
   /// Fastest clock that the virtual encoder allows, in kHz; its period is the document's Tcs.
   std::uint32_t fastest_khz = 250;
 };

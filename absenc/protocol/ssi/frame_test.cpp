@@ -72,7 +72,7 @@ TEST(SsiFrame, ChecksBitsAfterWord) {
   EXPECT_EQ(decode(one, "00011110111101").error(), Error::cross_check_failed);
   EXPECT_EQ(decode(zero, "11111111111111").error(), Error::line_stuck);
   EXPECT_EQ(decode(one, "00000000000000").error(), Error::line_stuck);
-  EXPECT_TRUE(decode(zero, "00000000000000"));  // all bits 0 are the position 0
+  EXPECT_TRUE(decode(zero, "00000000000000"));  // a word whose bits are all 0 is valid: its position is 0
 }
 
 TEST(SsiFrame, EncodeFailsWithoutRoom) {
