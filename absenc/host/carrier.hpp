@@ -27,7 +27,8 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // no silence is reported before a step was sent, or an item or line error arrived
+    // true, so that no silence is reported until a transfer or pulse was sent, or an item or a line error arrived
+    silence_reported_ = true;
     take_steps(now);
   }
   /// Returns whether a conversation runs.

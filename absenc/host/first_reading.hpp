@@ -108,7 +108,7 @@ class FirstReading {
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }
-  // Returns the largest distance that can be judged: 15/32 of 2^bits counts.
+  // Returns the largest distance of two positions of `bits` bits that can be judged: 15/32 of 2^bits counts.
   [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;

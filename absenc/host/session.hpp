@@ -234,7 +234,8 @@ class Session {
       // after a timeout the first position must be confirmed anew, because the encoder may have been switched off
       if (error == Error::timeout) doubt();
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      // A reply arrived after the timeout, and the reply to another attempt would most likely be late, too.
+      // A reply arrived after the timeout. The command is not repeated, because the reply to another attempt would most
+      // likely be late, too.
       if (error == Error::timeout && late() != late_before) return conversation;
       ++counters_.repeated;
     }

@@ -153,8 +153,9 @@ struct HostClause {
   HostDemand demand;           ///< Kind of the clause, which selects its test.
   /// For HostDemand::rule and HostDemand::row: name of the rule that hosts must keep.
   std::string_view rule{};
-  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if the hosts that
-  /// the tests use for every clause keep this clause. Two rules that every such host breaks together are one clause.
+  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if none of the
+  /// hosts that the tests use for every clause breaks this clause. If each such host that breaks one rule also breaks
+  /// another, both rules belong into one clause.
   std::array<HostScript, 2> breaks{};
   HostScript keeps{};  ///< a scripted host that keeps this clause, with requests like those of `breaks`; empty: none
   /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".

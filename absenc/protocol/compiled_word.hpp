@@ -76,7 +76,7 @@ class CompiledWord {
   // Returns the values of the fields with Meaning::value.
   template <std::size_t size>
   [[nodiscard]] constexpr std::array<std::uint64_t, size> numbers_of(std::uint64_t high) const {
-    // Cleared in two halves, because g++ clears a whole array by a slow `rep stos`.
+    // The array is cleared in two halves, because g++ clears a whole array by a slow `rep stos`.
     std::array<std::uint64_t, size> numbers;
     for (std::size_t i = 0; i < size / 2; ++i) numbers[i] = 0;
     for (std::size_t i = size / 2; i < size; ++i) numbers[i] = 0;

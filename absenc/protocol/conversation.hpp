@@ -25,7 +25,7 @@ struct Exchange {
 
 /// Two texts for people that explain an error; either may be empty.
 struct Explanation {
-  std::string_view detail{};  ///< the step that failed, and the evidence for it
+  std::string_view detail{};  ///< the step of the command that failed, and the evidence for this
   std::string_view advice{};  ///< what to try, instead of the error's own advice
 };
 

@@ -13,8 +13,8 @@ namespace absenc::sim {
 
 namespace {
 
-// Returns whether a UART with settings `a` receives characters sent with `b`. It samples the stop bit in its middle, so
-// the rates may differ by 5 %.
+// Returns whether a UART with settings `a` receives characters sent with settings `b`. The UART samples the stop bit in
+// its middle, so the rates may differ by 5 %.
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);

@@ -122,7 +122,7 @@ TEST(Waveform, CommentsListTheItems) {
 
 TEST(Waveform, Character) {
   Picture waveform(LinkKind::half_duplex, slow);
-  waveform.character(NodeRole::host, 5us, 15us, 0x1A);  // bits on the line: 0 01011000 1
+  waveform.character(NodeRole::host, 5us, 15us, 0x1A);  // bits on the line: start bit 0, data bits 01011000, stop bit 1
   EXPECT_EQ(body(waveform),
             "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
             "#25000\n");
@@ -131,7 +131,8 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11, with the parity bit p
+    // bits on the line: start bit 0, data bits 00000001, parity bit, stop bits 11
+    waveform.character(NodeRole::device, 0us, 12us, 0x80);
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }

@@ -89,7 +89,8 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : take_bad();
 }
 
-// Returns the index of the newest outstanding request that ended by `begin`, or nothing.
+// Returns the index of the newest outstanding request that ended at the tick `begin` or earlier; nothing if there is
+// none.
 std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {

@@ -68,7 +68,8 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // Decodes until a character begins at the same time as one of `targets`; returns the index of that target.
+  // Decodes until a character begins at the same time as one of the characters `targets`, which another decoder found;
+  // returns the index of that target.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);

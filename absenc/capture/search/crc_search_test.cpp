@@ -239,7 +239,8 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares the list of divisors with the result of trying every polynomial that has the constant term 1.
+// Compares the divisors that `divisors` lists with those found by dividing by every polynomial that has the constant
+// term 1.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;
@@ -255,7 +256,7 @@ RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
 }
 
 TEST(Polynomial, DividesAcrossWords) {
-  Polynomial product;  // the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
+  Polynomial product;  // the dividend is the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
   for (int i = 208; i >= 0; --i)
     product.append(i == 208 || i == 202 || i == 200 || i == 15 || i == 9 || i == 8 || i == 2 || i == 0 || i == 7);
   Polynomial rest = product;

@@ -102,7 +102,7 @@ class ClockedHostOf : public ClockedEngine {
 template <Clocked P>
 class ReadClocked : public ClockedHostOf<P> {
  public:
-  /// Reads from an encoder with this format.
+  /// Constructs a conversation that reads an encoder of this format.
   explicit ReadClocked(const typename P::Format& format) : ClockedHostOf<P>(format) {}
 
  private:

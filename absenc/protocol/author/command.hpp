@@ -23,7 +23,7 @@ class Refusal final : public Conversation<Item> {
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
   /// Ignores every event.
   void feed(const Event<Item>&) override {}
-  /// Returns the step `done`.
+  /// Returns the step `done`, which ends the conversation.
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return why_; }
@@ -87,10 +87,10 @@ struct Report {
 /// conversation.
 template <class Subject, class T>
 struct Finding {
-  /// Type of the object that `put` and `put_left` get besides the result: the format, or a base class of the
+  /// C++ type of the object that `put` and `put_left` get besides the result: the format, or a base class of the
   /// conversation.
   using Of = Subject;
-  /// Type of the procedure's result.
+  /// C++ type of the procedure's result.
   using Found = T;
 
   /// Puts the fields of the result of a successful procedure into the sink.

@@ -16,7 +16,7 @@ namespace absenc::author {
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:
-  /// Reads from an encoder of this format with `request`.
+  /// Constructs a conversation that reads an encoder of this format by the request `request`.
   ReadConfirmed(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }

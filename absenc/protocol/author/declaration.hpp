@@ -98,7 +98,8 @@ struct Declaration {
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   /// Constructs a Follower, which finds frames that are composed of several exchanges; null: there are no such frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
-  std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
+  /// Number of bytes of storage that `follower` needs for the Follower that it constructs.
+  std::size_t follower_storage = 0;
   const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.
   const FieldInfo* alarms = nullptr;          ///< Field that describes the flags of Reading::alarms; null: none.
   const FieldInfo* second_status = nullptr;   ///< Field of the status of channel 2; null: none.

@@ -67,7 +67,8 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] Error error() const final { return error_; }
   /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
   void report(FieldSink&) const override {}
-  /// Returns the last request, which is empty after `listen`, and the bytes of `reply`.
+  /// Returns the last request, which is empty after `listen`, and the bytes received since then, as `reply` returns
+  /// them.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Returns the time at which the last request was due to begin.

@@ -42,7 +42,7 @@ template <auto member>
 struct OptionOf {
   /// Format of the encoder: the values of its options.
   using Format = decltype(detail::format_of(member));
-  /// Type of the format's member that the option sets.
+  /// C++ type of the format's member that the option sets.
   using Member = decltype(detail::member_of(member));
   Option info;  ///< Description of the option, without the member.
 

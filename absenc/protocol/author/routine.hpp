@@ -23,8 +23,8 @@ namespace absenc::author {
 /// How a procedure ended: its error, with texts for people.
 struct Outcome {
   Error error = Error::none;  ///< Why the procedure failed; `Error::none`: it succeeded.
-  std::string_view detail{};  ///< the step that failed, and the evidence
-  std::string_view advice{};  ///< what to try, instead of the error's own advice
+  std::string_view detail{};  ///< text for people: the step of the procedure that failed, and the evidence
+  std::string_view advice{};  ///< text for people: what to try, instead of the error's own advice
   /// time after the last sent or received character in which nothing may disturb the encoder
   Time hold{};
   /// True: the explanation of the last reply is not added to `detail` and `advice`.

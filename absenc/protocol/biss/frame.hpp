@@ -309,7 +309,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// Decodes a frame whose format is known at compile time; the errors are those of a format known at run time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
-  // Processors without registers of 64 bits get only one decoder, to save memory.
+  // For processors without registers of 64 bits only one of the two decoders is compiled, to save memory.
   if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
     return detail::decode_compiled<typename Known<format>::Word>(
         detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });

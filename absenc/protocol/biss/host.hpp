@@ -31,9 +31,9 @@ template <class F>
 struct ProtocolOf {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = F;
-  /// Empty type: on a clocked link the host sends no requests.
+  /// C++ type of requests, which is empty: on a clocked link the host sends no requests.
   using Request = author::NoRequest;
-  /// Type of a decoded frame.
+  /// C++ type of a decoded frame.
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
   /// Interface by which procedures clock frames.
   using Dialog = ControlDialog<F>;

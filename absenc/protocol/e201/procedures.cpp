@@ -64,7 +64,7 @@ Procedure read_info(Dialog& dialog, InterfaceResults& found) {
 
 namespace {
 
-// Sets the clock and reads it back; cross_check_failed: another clock is set afterwards.
+// Sets the clock number and reads it back. Error cross_check_failed: the number read back is another one.
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
   const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
