@@ -34,7 +34,7 @@ struct Layout {
 
 /// Level changes of one channel; the level alternates, and the times increase strictly.
 struct Changes {
-  bool before = false;  // level before the first change
+  bool before = false;  // level of the channel before its first change
   std::vector<Tick> at;
 };
 
@@ -47,7 +47,8 @@ struct Character {
   // Data bits above the eighth. Later decode_async splits such a character into two of one byte each.
   std::uint8_t high = 0;
   bool bad_parity = false;
-  bool bad_stop = false;  // framing error; with value 0 and a line that stays low it is a break
+  // true: the stop bit was 0 (framing error). If the value is 0 and the line stays low, this is a break.
+  bool bad_stop = false;
   bool is_break = false;
 };
 
@@ -96,7 +97,8 @@ struct Block {
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
-  std::uint64_t file_offset = 0;      // number by which the reader finds the part in `fill`, such as an offset
+  // number by which the reader finds the part of the file when `fill` is called, such as an offset
+  std::uint64_t file_offset = 0;
   std::uint64_t file_size = 0;
 };
 

@@ -76,9 +76,10 @@ struct Cycle {
   Kind kind = Kind::missing;  ///< kind of this cycle
   /// missing: the error of the reading; `busy` if the reading had not ended when the next cycle began
   Error error = Error::none;
-  Time begun{};             ///< time at which the cycle began
-  Reading reading{};        ///< the last reading; it is of this cycle if the cycle is fresh or invalid
-  std::uint32_t stale = 0;  ///< number of cycles since the last fresh one; 0: this cycle is fresh
+  Time begun{};  ///< time at which the cycle began
+  /// the last reading; it was read in this cycle if `kind` is fresh or invalid, else in an earlier one
+  Reading reading{};
+  std::uint32_t stale = 0;  ///< number of cycles since the last cycle that gave a valid position; 0: this cycle did
   /// Returns the time from the latch of `reading` to `at`.
   [[nodiscard]] Time age(Time at) const { return at - reading.latched; }
 };
@@ -164,13 +165,14 @@ class CyclicHost final : public Machine<Item> {
   std::uint32_t unasked_ = 0;
   User user_ = User::nobody;
   bool wants_ = false;
-  bool is_row_ = false;       // no position may be requested before the service has sent its next request
-  bool is_too_long_ = false;  // the service's next request did not fit between two positions
+  // true: the service keeps the line, so no position may be requested before the service has sent its next request
+  bool is_row_ = false;
+  bool is_too_long_ = false;  // true: the service's next request did not fit between two positions
   bool takes_ = false;        // the running cycle belongs to the service, so that no position is read
   bool carries_ = false;      // the position of the running cycle comes with the service's reply
-  bool is_concluded_ = true;  // the result of the running cycle was emitted
+  bool is_concluded_ = true;  // true: the result of the running cycle was emitted
   bool emitting_ = false;
-  bool in_transfer_ = false;    // the transfer on the line has not ended
+  bool in_transfer_ = false;    // true: the transfer that was begun on the line has not ended
   bool ends_by_items_ = false;  // the transfer ends when its items are received: on SPI and clocked links
 };
 
@@ -293,7 +295,7 @@ void CyclicHost<Item, Read>::conclude_with(const Reading& reading) {
 
 // ---- Services
 
-// Asks the service for its next step, while it does not use the line.
+// Asks the conversation of a service that does not use the line now for its next step.
 template <class Item, class Read>
 void CyclicHost<Item, Read>::run_service(Time now) {
   while (service_ != nullptr && user_ == User::nobody && !wants_ && now >= wake_) {
@@ -412,7 +414,8 @@ Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
     constexpr unsigned longest_frame = 160;
     return line.bits(longest_frame * (step.out.size() + step.expect));
   } else {
-    if (step.answer == Time{} && step.expect != 0) {  // SPI
+    // only a transfer on an SPI link expects items without a time limit for an answer
+    if (step.answer == Time{} && step.expect != 0) {
       return line.select_lead + line.bits(8 * std::max(step.out.size(), step.expect));
     }
     const Time pauses = step.frame != 0 ? static_cast<int>(step.out.size() / step.frame) * step.width : Time{};

@@ -20,8 +20,7 @@ enum class LinkKind : std::uint8_t {
   can,
 };
 
-/// Returns whether the host clocks every item, so that the encoder sends only while the host clocks.
-/// Returns whether frames are sequences of bits, which need not fill whole bytes.
+/// Returns whether frames on links of this kind are sequences of bits, which need not fill whole bytes.
 [[nodiscard]] constexpr bool carries_bits(LinkKind kind) {
   return kind == LinkKind::clocked || kind == LinkKind::clocked_bidirectional;
 }

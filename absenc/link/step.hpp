@@ -18,12 +18,13 @@ template <class Item>
 struct Step {
   /// Actions that a machine requests from its port.
   enum class Kind : std::uint8_t {
-    wait,       ///< no action until the next event
-    transfer,   ///< not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
-    pulse,      ///< not before `at`: drive `wire` active for `width`
-    configure,  ///< switch this end of the line to `rate`; all else stays as it is
-    emit,       ///< a result is ready; the caller reads it and calls `next` again
-    done,       ///< the conversation has ended
+    wait,      ///< no action until the next event
+    transfer,  ///< not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
+    pulse,     ///< drive the wire `wire` active for the time `width`, beginning not before `at`
+    /// switch this end of the line to `rate` bits per second; all other settings of the line stay as they are
+    configure,
+    emit,  ///< a result is ready; the caller reads it and calls `next` again
+    done,  ///< the conversation has ended
   };
 
   Kind kind = Kind::wait;  ///< requested action

@@ -57,7 +57,7 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  /// Whether the command is treated as a change of the encoder.
+  /// Whether programs treat the command as one that changes the encoder.
   bool changes_encoder = false;
   bool repeatable = true;  ///< Whether the same command may be sent again after an error.
   /// For verb config_set: name of the config_get command that reads the setting; "": none.

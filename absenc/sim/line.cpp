@@ -209,7 +209,7 @@ void Line<Item>::serve(Node node) {
         break;
     }
   }
-  state.due = never;  // the machine is done: no later event wakes it
+  state.due = never;  // the machine is done, so no timer or silence may wake it any more
 }
 
 template <class Item>

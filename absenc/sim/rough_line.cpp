@@ -258,7 +258,7 @@ void RoughLine<Item>::feed(const Event<Item>& event) {
   serve_device();
 }
 
-// Carries out the device's steps until it waits or is done.
+// Carries out the steps of the device's machine until the machine waits or is done.
 template <class Item>
 void RoughLine<Item>::serve_device() {
   while (carry_out(device_.next(time_))) {

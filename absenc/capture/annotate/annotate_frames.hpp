@@ -78,7 +78,7 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;  // storage of a word whose bits are shifted against those of its burst
+  std::vector<std::uint8_t> shifted_;  // storage of a word whose bits are not exactly the bits of its burst
   // storage of the last word, with the encoder's control communication bit set to 0
   std::vector<std::uint8_t> silenced_;
   ControlFrames control_;

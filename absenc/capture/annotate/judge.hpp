@@ -30,7 +30,7 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// Decodes a request and its reply, and returns the error; see `contents`.
+  /// Decodes a request and its reply, stores what `contents` returns, and returns the error of decoding.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
     const Error error = decoder_ != nullptr ? decoder_->decode(request, reply, decoded_)

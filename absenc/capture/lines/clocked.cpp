@@ -36,8 +36,8 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // Two lengths of rests are different if they differ by more than a seventh, and by more than the sampling error of
-    // two changes.
+    // Rests of the clock count as rests of two different lengths if their lengths differ by more than a seventh, and by
+    // more than the sampling error of two level changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -89,7 +89,8 @@ void ClockedDecoder::begin_part(const ClockedPart& part) {
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// Begins a burst at the tick `at`. Returns true instead if one of `targets` begins at that tick in the same state.
+// Begins a burst at the tick `at`. If one of `targets`, the bursts that another decoder found, begins at that tick in
+// the same state, returns true instead.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;

@@ -62,7 +62,7 @@ class ClockedDecoder {
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
 
  private:
-  // The changes of one wire within a part.
+  // The level changes of one wire in the part of the capture that is decoded.
   struct Wire {
     bool level = false;
     std::span<const Tick> left{};  // changes of the wire that are not handled yet, in ticks
@@ -76,7 +76,7 @@ class ClockedDecoder {
   };
   struct Targets {
     std::span<const Burst> bursts;
-    const Burst* open;  // burst that the other decoder has not completed yet; null: none
+    const Burst* open;  // burst that the decoder of `bursts` has begun and not completed; null: none
     std::size_t next = 0;
     bool met = false;
   };
@@ -103,9 +103,9 @@ class ClockedDecoder {
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // without chip select: the clock has changed at most once in the present burst
-  bool fell_ = false;     // since the last word the clock has fallen once, and then rested at low level
-  bool changed_ = false;  // the data line has changed during the present rest of the clock
+  bool lone_ = false;     // true, without chip select: the clock has changed at most once in the present burst
+  bool fell_ = false;     // true: since the last word the clock has fallen once, and then rested at low level
+  bool changed_ = false;  // true: the data line has changed during the present rest of the clock
   Burst burst_;
 };
 

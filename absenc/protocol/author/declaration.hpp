@@ -57,7 +57,8 @@ struct Declaration {
   bool (*is_usable)(const Format&) = nullptr;
   /// Returns the request that a reply captured without one is taken to answer, or an error.
   Result<Request> (*guess_request)(const Format&, ContentOf<P> reply) = nullptr;
-  /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins so. Null: P::longest_reply.
+  /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins with these bytes. Null:
+  /// every reply is assumed to have the length P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
   /// Returns the error to report for the reply to an invalid request. Null: `error`, the request's own error.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
@@ -77,7 +78,8 @@ struct Declaration {
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
   /// Returns whether the encoder answers a request. Null: as Protocol::manner states, if the host sends requests.
   bool (*is_answered)(const Options&, Frame request) = nullptr;
-  /// Returns whether the checks must detect a flip of this bit of a valid reply; null: every bit.
+  /// Returns whether the checks must detect that this bit of a valid reply is flipped; null: they must detect every
+  /// flipped bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Returns the bits of a valid reply that carry a field. Without this function they are unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
@@ -98,7 +100,8 @@ struct Declaration {
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   /// Constructs a Follower, which finds frames that are composed of several exchanges; null: there are no such frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
-  std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
+  /// Number of bytes of storage that `follower` needs for the Follower that it constructs.
+  std::size_t follower_storage = 0;
   const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.
   const FieldInfo* alarms = nullptr;          ///< Field that describes the flags of Reading::alarms; null: none.
   const FieldInfo* second_status = nullptr;   ///< Field of the status of channel 2; null: none.
@@ -107,7 +110,8 @@ struct Declaration {
   std::span<const RegisterInfo> registers{};  ///< Registers of the encoder that hosts can access.
   std::span<const Condition> conditions{};    ///< Conditions of the virtual encoder's environment that users can set.
   LineTiming timing{};                        ///< Times of the line, which decoding captures needs.
-  const Unit* over_spi = nullptr;  ///< The unit of the same encoder on SPI, if that is another unit; null: it is not.
+  /// The unit that describes the same encoder behind an SPI controller; null: there is no such unit.
+  const Unit* over_spi = nullptr;
 };
 
 /// Returns the format whose members have the values `values` of `options`.

@@ -8,7 +8,8 @@
 
 namespace absenc::author {
 
-/// Protocol P with constant `format` and `request`; its own Format and Request are empty.
+/// The protocol P for an encoder whose `format` and `request` are constants; the types Format and Request of this class
+/// are empty.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 struct Known {
   struct Format {};

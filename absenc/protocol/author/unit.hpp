@@ -48,7 +48,8 @@ struct Descriptor {
 
   /// Whether replies to most requests have the position.
   static constexpr bool carries_position = requires { P::replies_carry_position; };
-  /// Whether the protocol has requests that its functions decode.
+  /// Whether hosts send requests that functions of P decode. False on clocked lines, and if the declaration has a
+  /// `decode` of its own.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
   /// Whether frames are bits.
   static constexpr bool has_bits = Clocked<P> || Bitwise<P>;
