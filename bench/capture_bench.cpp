@@ -191,7 +191,8 @@ Cost plain_read(const File& file) {
       }
     }
   });
-  if (sum == 1) std::puts("");  // uses the sum, which keeps the compiler from omitting its calculation
+  // prints depending on the sum of all samples, so that the compiler cannot omit its calculation
+  if (sum == 1) std::puts("");
   return cost;
 }
 
@@ -284,7 +285,7 @@ void compare_file_sizes(bool quick) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any argument selects the short run
+  const bool quick = argc > 1;  // a benchmark that is started with any argument makes only a short run
   static_cast<void>(argv);
   throughput(quick);
   two_threads(quick);

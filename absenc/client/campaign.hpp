@@ -16,7 +16,7 @@ namespace absenc::client {
 /// A kind of fault that a campaign injects.
 struct LineFault {
   std::string_view name;     ///< Name of the fault, as `--fault` takes it.
-  std::string_view meaning;  ///< What the fault does to the line, as a phrase.
+  std::string_view meaning;  ///< Damage that the fault does to the line, as a phrase.
   double usual;              ///< Default rate of the fault, 0 to 1.
 };
 
@@ -49,9 +49,10 @@ struct CheckWorth {
   /// Hamming distance of the checksum: every error of fewer wrong bits, all of them covered by it, is detected; 0:
   /// above 8.
   unsigned distance = 0;
-  double words = 0;   ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
-  double unseen = 0;  ///< Share of all replies with damage only in covered bits and yet a correct checksum.
-  double taken = 0;   ///< Share of all replies that are damaged, yet accepted with a wrong position.
+  double words = 0;  ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
+  /// Share of all replies with wrong bits only among those that the checksum covers, and yet with a correct checksum.
+  double unseen = 0;
+  double taken = 0;  ///< Share of all replies that are damaged, yet accepted with a wrong position.
   /// Standard deviation of `taken`, the share of accepted damaged replies, which is estimated from random samples.
   double taken_deviation = 0;
 };
@@ -87,7 +88,8 @@ struct CampaignResult {
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
   /// Computed strength of the frame check; without a value if it cannot be computed, as on CAN.
   std::optional<CheckWorth> worth{};
-  /// Processor time of the process during the exchanges, in seconds, without the time to compute `worth`.
+  /// Processor time of the process during the exchanges, in seconds; the time to compute the strength of the checksum
+  /// (`worth`) is not included.
   double seconds = 0;
 };
 

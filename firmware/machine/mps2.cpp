@@ -29,7 +29,7 @@ void set_alarm(Time delay) {
   register_at(timer_control) = 0;
   register_at(timer_reload) = ~std::uint32_t{0};
   register_at(timer_value) = counts > 0 ? counts : 1;
-  register_at(timer_control) = 9;  // enables the timer and its interrupt
+  register_at(timer_control) = 9;  // bit 0 enables the timer, bit 3 its interrupt
   register_at(set_enable) = 1u << alarm_number;
 }
 
@@ -43,7 +43,7 @@ void handle_alarm() {
 
 void start_uart() {
   register_at(divider) = 16;
-  register_at(control) = 0xF;  // enables transmitter, receiver and the interrupts of both
+  register_at(control) = 0xF;  // bits 0 to 3 enable the transmitter, the receiver and the interrupts of both
   register_at(set_enable) = 1u << receiver_number | 1u << transmitter_number;
 }
 

@@ -40,8 +40,8 @@ struct Motion {
   unsigned turns;
   double unit_um;
   Time period;
-  std::uint64_t speed;  // speed in counts per period, times 2^16, modulo 2^64
-  Time open;            // greatest uncertainty of a latch time
+  std::uint64_t speed;  // speed in counts per period, as a fixed-point number with 16 binary places, modulo 2^64
+  Time open;            // greatest uncertainty of the time at which a reading was latched
 };
 
 /// Gives readings of many motions to a part, then ends the emulator.

@@ -47,7 +47,8 @@ struct Rates {
 
 template <class Item>
 struct RoughBench {
-  /// Connects host and virtual encoder. `what`, `how` and `measured` must outlive the object.
+  /// Connects the host and the virtual encoder of the unit `what` with the options `how`; the encoder measures the
+  /// shaft `measured`. All three must outlive the object.
   RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
       : unit(what),
         options(how),
@@ -81,8 +82,8 @@ struct RoughBench {
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Returns the number of requests since the counts `before` were taken; if there were none, the number of unsolicited
-  /// frames, but at least 1.
+  /// Returns the number of requests that were sent after the counts `before` were read; if there were none, the number
+  /// of unsolicited frames since then, but at least 1.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);

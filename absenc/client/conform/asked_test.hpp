@@ -40,7 +40,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
       EncoderAddress address = parse_address(text);
       const VirtualDevice device(unit, address.options, address.device);
       all.push_back(std::move(address));
-    } catch (const UsageError&) {  // leaves out a value that no virtual encoder has
+    } catch (const UsageError&) {  // leaves out an option value that no virtual encoder can have
     }
   };
   for (const Option& option : unit.options) {

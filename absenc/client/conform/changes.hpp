@@ -22,7 +22,7 @@ struct CommandResult {
   Error error = Error::none;
   std::string detail{};
   std::uint64_t requests = 0;  // number of requests that the command sent
-  bool heard = false;          // whether anything but an echo was received after the last request
+  bool heard = false;          // whether anything but an echo was received after the last request of the command
   Answer answer{};
   std::optional<std::int64_t> value{};  // byte or word of the memory that the reply carries; nothing: none
   std::vector<std::uint8_t> data{};     // several bytes that the reply carries, low byte of a word first; empty: none

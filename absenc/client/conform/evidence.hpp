@@ -30,7 +30,8 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good exchange make the decoder report one of `errors`.
+/// Changes a good exchange in several ways (a flipped bit, another length, another request) and returns for how many of
+/// them the decoder reports one of `errors`.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 

@@ -57,8 +57,8 @@ class TapPort final : public Port<Item> {
   Port<Item>& port_;
 };
 
-/// A device that is no encoder: replies with the items of `next`, and sends them unsolicited if the encoder would do
-/// so.
+/// A device that is no encoder: it replies to each request with the bytes or frames that `next` returns. If the encoder
+/// would send unsolicited frames, it sends them unsolicited.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:

@@ -98,7 +98,7 @@ class Tester {
   // The time of listening for a reply is 20 ms and the duration of 16 characters.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
-  static constexpr unsigned times = 3;  // number of times that a test sends its command or request
+  static constexpr unsigned times = 3;  // number of times that each test sends its command or request to the encoder
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
   // ---- Access to the line

@@ -13,7 +13,7 @@ namespace absenc::client {
 
 using All = std::vector<const Attempted*>;
 
-/// Returns the attempts of `all` for which `is` returns true, in their order.
+/// Returns those readings of `all` for which `is` returns true, in their order.
 template <class Is>
 [[nodiscard]] All chosen(const All& all, const Is& is) {
   All those;
@@ -21,21 +21,23 @@ template <class Is>
   return those;
 }
 
-/// Returns the attempts in which something was received, but no good reply, in their order.
+/// Returns the readings in which something was received, but no good reply, in their order.
 [[nodiscard]] All damaged(const std::vector<Attempted>& attempts);
 
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
 
-/// Returns whether a good reply is found among other bytes. Only for lines of characters.
+/// Returns whether the received bytes contain a good reply and further bytes. Only for lines of characters.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
-/// Returns whether the reply is shorter than its beginning requires. Only for lines of characters.
+/// Returns whether the reply ended before the length that its first bytes state. Only for lines of characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Counts replies that become good if one bit is flipped; 0 without enough evidence.
+/// Returns how many damaged replies become good if one bit is flipped. Returns 0 if there are fewer than five damaged
+/// replies, or if about as many random replies would become good, too.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
-/// Finds a change of bytes by an adapter, a driver or a device server. Only for lines of characters.
+/// Finds the change that an adapter, a driver or a device server has made to the bytes of the replies; returns nothing
+/// if there is none. Only for lines of characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);

@@ -23,13 +23,14 @@ namespace absenc::client {
 
 namespace {
 
-// number of readings with another setting before it is compared with the user's; a setting without any good reply
-// is dropped
+// Number of readings with a tried setting, such as another baud rate, before it is compared with the user's setting. A
+// tried setting without any good reply is dropped.
 constexpr std::size_t first_readings = 2;
-constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
+// number of readings with each of the two compared settings, in one turn of the comparison
+constexpr std::size_t trial_readings = 5;
 constexpr unsigned trial_turns = 2;
-// Time limit for the readings with each setting in one turn of the comparison: this time, and the duration of 200
-// characters.
+// Time limit for the readings with one setting in one turn of the comparison, to which the duration of 200 characters
+// is added.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
 // An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
@@ -112,7 +113,8 @@ class Doctor {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
     seen_.facts.kernel_direction = now.kernel_direction;
-    seen_.facts.latency_timer = now.latency_timer;  // opening the port may have shortened the latency timer
+    // absenc may have shortened the driver's latency timer when it opened the port
+    seen_.facts.latency_timer = now.latency_timer;
   }
 
   template <class Item>
@@ -267,8 +269,8 @@ class Doctor {
       const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character();
       examiner.read(*read, count, limit, attempts);
       return examiner.now() - begin;
-    } catch (const os::Failure&) {  // the port does not support this setting, or failed
-    } catch (const UsageError&) {   // the options need a wire that is not connected
+    } catch (const os::Failure&) {  // the port does not support the tried setting, or the port was lost
+    } catch (const UsageError&) {   // the tried options need a wire that is not connected
     }
     return {};
   }

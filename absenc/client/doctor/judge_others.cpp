@@ -135,7 +135,8 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
 // Searches options that explain the replies, as `identify` does, but only those of this unit with the encoder's
 // address.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // least number of replies; fewer are too weak evidence
+  // least number of replies from which other options are concluded; fewer replies are too weak evidence
+  constexpr std::size_t enough = 4;
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);

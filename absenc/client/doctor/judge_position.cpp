@@ -27,10 +27,11 @@ struct Walk {
   std::vector<std::uint64_t> places{};
   std::vector<std::int64_t> steps{};
   std::vector<Time> pauses{};
-  std::int64_t lowest = 0;  // lowest position relative to the first, in counts, continued past the end of the counter
+  // lowest position minus the first position, in counts; the positions are continued past the end of the counter
+  std::int64_t lowest = 0;
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // the numbers of turns that readings report as valid
+  std::set<std::int64_t> turns{};  // all numbers of turns that occurred in readings with valid turns
   std::size_t zero_crossings = 0;
   Time time{};  // time from the first to the last reading with a valid position
 

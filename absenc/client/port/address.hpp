@@ -125,7 +125,7 @@ struct EncoderAddress {
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;
-/// Returns the address of a name; `names` is the content of absenc.toml.
+/// Returns the address that absenc.toml gives to the encoder of this name; `names` is the content of absenc.toml.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
 /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".

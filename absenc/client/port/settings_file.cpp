@@ -151,7 +151,7 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
-  std::size_t dots = 0;  // number of dots in the dotted name that is being read
+  std::size_t dots = 0;  // number of dots in the name of a table or setting that is being read
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
       case '#':

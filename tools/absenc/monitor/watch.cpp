@@ -250,7 +250,7 @@ std::string Watch::result_of(Encoder& live, const Command& command) {
       return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
     return fmt::format("{}: {}", command.name, outcome.change.text());
-  } catch (const os::Failure& failure) {  // the port was lost, which the next reading reports
+  } catch (const os::Failure& failure) {  // the port was lost during the command; the next reading reports the loss
     return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
 }

@@ -39,8 +39,8 @@ struct Snapshot {
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;  // number of times that the position started again; see Encoder::restarts
-  double rate = 0;             // measured number of readings per second
-  Time median{};               // median of the latencies from request to reply
+  double rate = 0;             // number of readings per second, as measured
+  Time median{};               // median of the times from a request to the end of its reply
   Time percentile_99{};
   Time longest{};
   // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
