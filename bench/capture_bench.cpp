@@ -34,8 +34,9 @@ constexpr std::uint64_t megabyte = 1'000'000;
 }
 
 struct Cost {
-  double time;       // elapsed time in seconds
-  double processor;  // processor time of all threads and child processes, in seconds; it does not depend on other load
+  double time;  // elapsed time in seconds
+  // processor time of all threads and child processes, in seconds; unlike `time`, it is the same on a busy machine
+  double processor;
 };
 
 double processor_seconds() {
@@ -177,7 +178,8 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// Reads the same blocks as the decoder, only sums them up, and returns the time that this took.
+// Reads the blocks that the decoder reads, adds up their samples without decoding them, and returns the time that this
+// took.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;

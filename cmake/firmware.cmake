@@ -4,7 +4,7 @@
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
-# these flags follow those of the toolchain and override them
+# compiler flags of a Cortex-M4 with FPU; they stand behind those of the toolchain and override them
 set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)
 
 # For each machine: its sources in firmware/machine, and the start addresses of program and RAM.
@@ -70,8 +70,8 @@ target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-# drive and encoder are programs for the two ends of a T-format line; the other two have both ends of a line in one
-# program.
+# `drive` and `encoder` are programs for the two ends of a T-format line; each of the programs `cycles_...` contains
+# both ends of a line.
 foreach(program IN ITEMS drive encoder cycles_tformat cycles_biss)
   set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
   firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)

@@ -43,7 +43,7 @@ function(absenc_test_settings target)
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
 endfunction()
 
-# The path of the sources is defined only for this test, because it would make the compiler cache useless for others.
+# Only this test gets the path of the sources as a macro: with such a macro the compiler cache is useless.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")

@@ -29,7 +29,7 @@ struct CampaignChoices {
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; empty: the default rates of all faults.
   std::vector<std::string> faults{};
-  /// Number of exchanges to run, at least 1; a few more if the last reading needs them.
+  /// Number of exchanges after which the campaign ends, at least 1; it makes a few more to finish its last reading.
   std::uint64_t exchanges = 100'000;
   std::uint64_t seed = 1;  ///< Seed of faults and shaft positions; the same seed gives the same counts.
   /// Speed of the shaft in revolutions per minute, or mm/s for linear encoders; the host then confirms each position by
@@ -64,7 +64,8 @@ struct Guarded {
   /// that a fault has changed are left out.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
-  double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
+  /// Computed number of wrong positions that pass the frame checks and are then confirmed by a second reading.
+  double let_through = 0;
 };
 
 /// Result of a campaign: numbers of exchanges and shares of errors. In a campaign with a turning shaft (`rpm`),

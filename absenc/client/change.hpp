@@ -67,10 +67,12 @@ class OfChange final : public Base, public Changing {
 /// Returns the change that the exception carries; null if there is none or its state is `none`.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Rethrows the exception that is being handled, with `change` added where possible. Call this only in a catch block.
+/// Rethrows the exception that is being handled, with `change` added if the type of the exception can carry a change
+/// and it carries none yet. Call this only in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// Returns the result of `work`, which changes no encoder; adds `not_sent` to its exceptions.
+/// Returns the result of `work`, which runs before a change is sent and changes no encoder. Exceptions of `work` get
+/// the state `not_sent`.
 template <class Work>
 auto before_change(const Work& work) {
   try {

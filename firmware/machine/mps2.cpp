@@ -53,7 +53,8 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late handler finds both events and must handle the end of transmission first.
+  // If the handler runs late, it finds a received byte and the end of a transmission; it must handle the end of the
+  // transmission first.
   for (;;) {
     const bool has_received = (register_at(state) & receiver_is_full) != 0;
     while ((register_at(pending) & sent_bit) != 0) {

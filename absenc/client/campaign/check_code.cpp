@@ -101,8 +101,8 @@ bool CheckCode::find_check(AlteredReply& asked) {
   return true;
 }
 
-// Returns the check bits that must be flipped together with the bit number `bit` to make the reply good again; nothing
-// if there are none.
+// Returns the check bits that must be flipped together with the bit number `bit`, so that the checksum stays right;
+// nothing if no choice of check bits does that.
 std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);

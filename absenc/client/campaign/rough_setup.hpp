@@ -76,7 +76,7 @@ struct RoughBench {
     return *one;
   }
 
-  /// Sets the rates of all faults to those of the constructor; with `on` false, to 0.
+  /// With `on`, sets the rates of all faults to those given to the constructor; without it, to 0.
   void set_faults(bool on) {
     line.set_rates(on ? rates.line : sim::RoughRates{});
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
@@ -97,7 +97,7 @@ struct RoughBench {
     }
   }
 
-  // Returns whether a damaged request has changed the encoder, and then replaces the encoder.
+  // Returns whether a damaged request has changed the encoder; if so, puts a new encoder in its place.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;

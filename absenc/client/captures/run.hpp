@@ -51,7 +51,8 @@ class CaptureRun {
   [[nodiscard]] const Options& options() const { return options_; }
   /// Returns the number of ticks per second of the capture; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// Returns the options, completed by the capture's frames where possible. Call before `run`.
+  /// Returns the options of the unit. Options that the user left open get the values that the frames of the capture
+  /// show, where they show one. Call before `run`.
   const Options& settle_options();
   /// Decodes the whole capture into `all`. Calls `progress` with the tick that is reached. Throws UsageError, Failure
   /// and the exceptions of `all` and `progress`.

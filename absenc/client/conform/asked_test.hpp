@@ -31,7 +31,8 @@ inline EncoderAddress polled_address(const std::string& text) {
   return usual;
 }
 
-/// Returns addresses of the unit's virtual encoder, with default options and with other ones.
+/// Returns several addresses of the unit's virtual encoder: one with the default options, and others in which options
+/// have other values.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
   const auto add = [&](const Option& option, std::int64_t value) {

@@ -24,8 +24,10 @@ struct CommandResult {
   std::uint64_t requests = 0;  // number of requests that the command sent
   bool heard = false;          // whether anything but an echo was received after the last request of the command
   Answer answer{};
-  std::optional<std::int64_t> value{};  // byte or word of the memory that the reply carries; nothing: none
-  std::vector<std::uint8_t> data{};     // several bytes that the reply carries, low byte of a word first; empty: none
+  // byte or word of the memory in the reply of the command; nothing: the reply has none
+  std::optional<std::int64_t> value{};
+  // several bytes of the memory in the reply of the command, low byte of a word first; empty: the reply has none
+  std::vector<std::uint8_t> data{};
   std::optional<Reading> reading{};
 };
 

@@ -68,7 +68,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
-/// Adds mutants that send an earlier reply again, whole or in part; none on CAN.
+/// Adds mutants that replace a reply, or a part of it, by an earlier reply; adds no mutants on CAN.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {

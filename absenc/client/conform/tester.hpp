@@ -229,7 +229,8 @@ class Tester {
       return request;
     }
   }
-  /// Counts, for `time`, CAN frames that are like the replies to the readings; returns 0 on other links than CAN.
+  /// Listens for `time` and counts the good CAN frames that have the identifier of a reply to a reading; returns 0 if
+  /// the link is not CAN.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
@@ -279,7 +280,8 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // Tries several other addresses, because at a single one a neighbour on the line may reply.
+  // Sends requests to several addresses other than the encoder's: at a single address another device on the line may
+  // reply.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),

@@ -44,11 +44,13 @@ template <class Is>
 
 [[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
 
-/// Returns settings, as "model=23-bit", that change the options `now` into `wanted`.
+/// Returns the settings, such as "model=23-bit", that must be added to change the options `now` into the options
+/// `wanted`.
 [[nodiscard]] std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now);
 /// Returns a phrase that says how many readings were good: "no good reply", "3 of 24 replies good".
 [[nodiscard]] std::string good_as_said(std::size_t good, std::size_t tried);
-/// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
+/// Returns the settings that select these options, such as "model=23-bit"; for the default options "the usual
+/// settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);

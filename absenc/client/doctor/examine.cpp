@@ -35,7 +35,7 @@ constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
 // An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
 constexpr Time longest_start = std::chrono::seconds(2);
-// time limit of the first readings that are tried with other models and options
+// time limit of the readings with which other models and options are tried
 constexpr Time models_limit = std::chrono::seconds(3);
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(16);
@@ -197,8 +197,9 @@ class Doctor {
     try_each<Item>(other_addresses(address_), addresses_limit);
   }
 
-  // Tries settings until one is far better than the user's, or until the user's settings give mostly good readings
-  // again. Returns true then, so that the search ends; false if neither happens within `limit`.
+  // Reads with each of these settings in turn. Returns true as soon as one of them is far better than the user's, or
+  // the user's settings give mostly good readings again, which ends the search; returns false after the last setting or
+  // the time `limit`.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -237,8 +238,8 @@ class Doctor {
     return true;
   }
 
-  // Reads twice more with the user's settings, and takes the readings again if both are good: the encoder may have been
-  // powered on meanwhile.
+  // Reads twice more with the user's settings. If both readings are good, takes the whole series of readings again,
+  // because the encoder may have been powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
     const Time first = seen_.readings.empty() ? Time::min() : seen_.readings.front().began + longest_start;

@@ -44,7 +44,7 @@ Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
 
-// Returns whether `is` returns true for at least 8 of 10 attempts; the remaining attempts may be noise.
+// Returns whether `is` returns true for at least 8 of 10 readings; the remaining readings may be disturbed.
 template <class Is>
 bool most(const All& all, const Is& is) {
   const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
@@ -94,7 +94,7 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(FindingKind::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
-// Reports that two encoders reply at the same address, if a scan found that.
+// Reports that two encoders reply at the same address, if a scan of the bus has found such an address.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(FindingKind::same_address, {one.seen.clash});
@@ -356,7 +356,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     return;
   }
   if (most(all, [](const Attempted& attempt) { return attempt.error == Error::out_of_range; })) {
-    // The checksums are right, so with another format all replies may be good, including those that are good now.
+    // The checksums are right, but values are out of range. With another format all replies may be good, including
+    // those that are good now.
     if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
       findings.push_back(std::move(*other));
       return;

@@ -82,7 +82,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A wide movement is no noise; neither is a slow swing, which seldom changes direction.
+  // A movement over many counts is no noise; neither is a slow swing, which seldom changes direction.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0

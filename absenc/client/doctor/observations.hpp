@@ -20,7 +20,7 @@ namespace absenc::client {
 
 /// A setting that was tried instead of the user's.
 struct Trial {
-  FindingKind finding_kind{};  // kind of the finding that is reported if the other setting helps
+  FindingKind finding_kind{};  // kind of the finding that is reported if readings succeed with `setting`
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
@@ -82,7 +82,7 @@ struct Observations {
       std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
 }
 
-/// Returns whether at most one in 20 attempts is good; so few good replies may be due to chance.
+/// Returns whether at most one in 20 readings is good; so few good readings may be due to chance.
 [[nodiscard]] inline bool hardly_any_good(const std::vector<Attempted>& attempts) {
   return count_good(attempts) * 20 < attempts.size() + 1;
 }

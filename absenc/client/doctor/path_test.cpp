@@ -17,7 +17,7 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
     return text;
   }
 
-  /// Checks the first finding of each of these faults at each rate of the unit.
+  /// Checks, at each baud rate of the unit, that doctor's first finding about each of these faults is an expected one.
   void examine_each(const std::vector<PathFault>& faults) const {
     const Unit& unit = *GetParam();
     const std::string mode = asked_mode(unit);

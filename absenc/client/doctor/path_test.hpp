@@ -112,7 +112,8 @@ struct Far {
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes; with `goes_on`, always to the same ones.
+/// Opens links to the devices that `Far` describes: each time to new devices, or with `goes_on` always to the same
+/// ones.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -237,7 +238,8 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// Returns a setting with which the unit sends no stream; "": none is needed, or none was found.
+/// Returns a setting with which the encoder sends no unsolicited frames; "" if it sends none anyway, or if there is no
+/// such setting.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));

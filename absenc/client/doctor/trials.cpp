@@ -50,7 +50,7 @@ std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint
   return other;
 }
 
-// Returns the rates to try: first those of the protocol and its models, then common ones.
+// Returns the baud rates to try: first those of the protocol and its models, then other common rates.
 std::vector<std::uint32_t> rates_of(const Unit& unit) {
   std::vector<std::uint32_t> rates;
   const auto add = [&](std::uint32_t rate) {

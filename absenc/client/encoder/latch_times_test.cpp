@@ -106,7 +106,8 @@ std::vector<Case> cases() {
   return all;
 }
 
-// Returns the speed of the shaft. One revolution moves a linear encoder over its whole range, so it is slower there.
+// Returns the speed of the simulated shaft. One revolution moves a linear encoder over its whole range, so the shaft of
+// a linear encoder turns more slowly.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;

@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-/// How long an attempt tries to get a reply from an encoder that does not answer.
+/// Limits of the search for an encoder that may not answer: duration and repetitions.
 struct Effort {
   Time scan{};  // a scan of the line ends after this time without any reply
   // whether an encoder without a reply gets further requests, and a scan without any reply is repeated
@@ -318,8 +318,8 @@ class Attempt {
     return targets;
   }
 
-  // Polls one encoder and stores the candidates; returns whether the encoder replied. `encoder` is the address setting
-  // of the polled encoder, "": none.
+  // Polls one encoder, stores the candidates for it, and returns whether it replied. `encoder` is the setting with the
+  // encoder's address; "": the encoder has no address.
   bool ask_one(const Command& read, const SettingTexts& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
@@ -354,7 +354,8 @@ class Attempt {
       if (os::interrupted()) throw os::Interrupted{};
       if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
-    // Removes readings without a reply, which may have come too late on a busy computer, and replies of other encoders.
+    // Removes two kinds of readings: those without a reply, which may have come too late on a busy computer, and those
+    // with a reply of another encoder.
     std::erase_if(exchanges, [&](const ObservedExchange& one) {
       return one.reply.frame().empty() || is_of_another(one, options);
     });

@@ -37,9 +37,10 @@ struct LineFindings {
   std::size_t unsolicited = 0;
   // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
   std::size_t searches = 0;
-  bool only_echo = false;          // whether in some conversation nothing but the adapter's echo was received
-  std::set<std::string> lines{};   // the kinds of lines that were tried, in words
-  std::vector<std::string> notes;  // sentences about impossible attempts and contradictory identities
+  bool only_echo = false;         // whether in some conversation nothing but the adapter's echo was received
+  std::set<std::string> lines{};  // the kinds of lines that were tried, in words
+  // sentences about protocols that could not be tried, and about identities that contradict the options
+  std::vector<std::string> notes;
   bool out_of_time = false;
   bool interrupted = false;
 };

@@ -27,7 +27,8 @@ struct Attempted {
   std::string advice{};                  // the unit's advice on the error; "": it has none
   Time began{};                          // time at which the command began, by the port's clock
   capture::ObservedExchange exchange{};  // last request and its reply, without echo
-  // bytes received in the last exchange, with echo; for a stream those of its frame; empty on CAN
+  // bytes received in the last exchange, including the echo; for a stream, the bytes of the frame that gave the result;
+  // empty on CAN
   std::vector<std::uint8_t> raw{};
   bool heard = false;            // whether anything was received after the last request; an echo counts, too
   bool answered = false;         // whether something other than an echo was received after the last request
@@ -41,7 +42,7 @@ struct Attempted {
   // greatest time to the end of the reply (`after`) that the protocol allows for a reply of this length
   Time allowed{};
   std::optional<Reading> reading{};
-  // value of the first reported field that counts replies; nothing: none was reported
+  // value of the first field of the reply that counts replies; nothing: no field does, or no reply came
   std::optional<std::int64_t> counter{};
   const FieldInfo* counter_field = nullptr;
   bool possible = true;  // whether the unit has a command that can be run with the options of the encoder
@@ -205,7 +206,8 @@ class Runner {
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // Each attempt has a time limit of its own, because on a line that is never silent an attempt might not end.
+    // Each attempt to run the command has a time limit of its own: on a line that is never silent the attempt might not
+    // end.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -237,7 +239,7 @@ class Runner {
 
   // ---- Listening without a request
 
-  /// Listens for `time`, but ends earlier if `on_items(items)` returns false.
+  /// Listens for `time` and passes received bytes or frames to `on_items`; ends early if `on_items` returns false.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -393,7 +395,7 @@ class Runner {
   bool open_ = false;                  // whether the last exchange has not been passed to `on_exchange` yet
   std::uint64_t opened_at_ = 0;        // number of requests that were sent before the open exchange began
   std::uint64_t requests_before_ = 0;  // number of requests that were sent before the present command
-  // number of items that were received before the present command began, and belong to an older request
+  // number of bytes or frames that were received before the present command began; they belong to an older request
   std::size_t received_before_ = 0;
   std::uint64_t unanswered_ = 0;  // number of requests without reply in the present command
   // number of late replies so far; a late reply in the last exchange is not counted yet

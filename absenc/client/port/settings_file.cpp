@@ -234,7 +234,7 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      // the file type is `none` for a symbolic link that leads to itself
+      // std::filesystem reports the file type `none` for a symbolic link that leads to itself
       if (type == fs::file_type::not_found || type == fs::file_type::none) {
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }

@@ -67,12 +67,12 @@ class VirtualDevice {
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 
   [[nodiscard]] const Any<Device>& device() const { return device_; }
-  /// Return the machine that is on the line: `bytes` is null on CAN, `frames` on all other lines.
+  /// Return the machine that is connected to the line. `bytes()` is null on CAN, `frames()` is null on all other lines.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// Returns how often each fault was injected; null if faults were never enabled.
   [[nodiscard]] const sim::FaultCounts* faults() const;
-  /// Returns the number of replies with a fault, as a delay; nothing on CAN, or if faults were never enabled.
+  /// Returns how many replies had a fault such as a delay; nothing on CAN, or if faults were never enabled.
   [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
 
  private:

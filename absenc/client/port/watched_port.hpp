@@ -16,7 +16,7 @@
 
 namespace absenc::client {
 
-/// A request and everything that was received until the next request; items beyond a limit are dropped.
+/// A request and all bytes or frames that were received until the next request; those beyond a limit are dropped.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
@@ -59,7 +59,7 @@ struct OutOfTime {};
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
-  /// Reserves memory for received items, so that most exchanges allocate none for them.
+  /// Reserves memory for received bytes or frames, so that most exchanges need no allocation.
   WatchedPort() {
     last.received.reserve(most_kept);
     last.marks.reserve(most_kept);
@@ -155,7 +155,7 @@ class WatchedPort final : public Port<Item> {
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
   Time looked_at_{};        // time that was read last from the port's clock
-  std::uint32_t rate_ = 0;  // rate that a conversation set, in bits per second; 0: it set none
+  std::uint32_t rate_ = 0;  // baud or bit rate that a conversation set, in bits per second; 0: no conversation set one
   bool aborted_ = false;
 };
 

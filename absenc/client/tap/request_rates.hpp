@@ -25,7 +25,8 @@ class RequestRates final : public capture::AnnotationSink {
     capture::Tick begin = 0;   // tick at which the first request of this kind began
     capture::Tick last = 0;    // tick at which the last request of this kind began
 
-    /// Returns the mean number of such requests per second; 0 if their times do not show it.
+    /// Returns the mean number of requests of this kind per second; 0 for a single request, or if all of them arrived
+    /// at the same time.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /

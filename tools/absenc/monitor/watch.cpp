@@ -146,8 +146,9 @@ void Watch::work(const std::stop_token& stop) {
         next = pace.next();
       }
     }
-  } catch (const os::Interrupted&) {  // a signal has set os::interrupted(), which ends every thread
-  } catch (const os::Ended&) {        // the thread was asked to end while it waited on a line without pauses
+    // a signal such as Ctrl-C has set os::interrupted(), at which every thread of the monitor ends
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {  // the thread was asked to end while it waited on a line without pauses
   } catch (const std::exception& error) {
     end(error.what());
   }
