@@ -34,7 +34,7 @@ constexpr std::uint64_t megabyte = 1'000'000;
 }
 
 struct Cost {
-  double time;  // elapsed time in seconds
+  double time;  // elapsed time of the measured work, in seconds
   // processor time of all threads and child processes, in seconds; unlike `time`, it is the same on a busy machine
   double processor;
 };

@@ -53,7 +53,7 @@ add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector
                    COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
 set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
 
-# with the RISC-V compiler, which has a build tree of its own, only this program is built
+# for RISC-V, which has a build tree of its own, only the program that decodes all vectors is built
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)
   firmware_program(vectors-rv32 virt 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
   add_custom_target(firmware-all DEPENDS firmware_vectors-rv32)

@@ -67,7 +67,7 @@ class AcceleratingShaft final : public Shaft {
   static constexpr std::int64_t start = (std::int64_t{1000} << 32) + (std::int64_t{1} << 30);
   // Returns the way 50 revolutions/s^2 * t^2 in 2^-32 revolution. The time t is `ns`, from -1 s to 1 s, in nanoseconds.
   [[nodiscard]] static constexpr std::int64_t curve(std::int64_t ns) {
-    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42, rounded
+    constexpr std::int64_t factor = 944'473;  // 50 revolutions/s^2 in 2^-32 revolution per ns^2, times 2^42, rounded
     return (ns * ns >> 20) * factor >> 22;
   }
 };

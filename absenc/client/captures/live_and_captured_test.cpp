@@ -203,7 +203,7 @@ Said said_with(std::string_view column, std::int64_t value) {
   return said;
 }
 
-// The second request of a conversation has another command code than the first.
+// In the conversation of this test, the second request has another command code than the first.
 TEST(Comparison, TakesExchangeFieldFromAnyRowAndOthersFromLast) {
   std::array<FieldInfo, 2> fields{};
   fields[0].name = "command";

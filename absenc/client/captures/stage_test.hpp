@@ -56,7 +56,7 @@ class HostEnd final : public Port<Item> {
 
   std::uint32_t rate;
   unsigned transfers = 0;
-  bool moved = false;  // whether the host has set another rate, which a capture cannot follow
+  bool moved = false;  // whether the host has changed the rate of the line, which a capture cannot follow
 
  private:
   Port<Item>& port_;

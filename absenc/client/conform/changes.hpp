@@ -57,7 +57,8 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line. An end of the test throws os::Interrupted only once, so that values can still be restored.
+/// Access to the line for a test that changes the encoder. If the test is interrupted, these functions throw
+/// os::Interrupted only once, so that values can still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request in the form that Unit::encode gives, and returns the exchange

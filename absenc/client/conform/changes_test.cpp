@@ -127,7 +127,8 @@ struct Bench {
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
   /// Returns position and settings as text. The memory is left out, because an encoder may count its writes in it.
   [[nodiscard]] std::string settings() const {
-    // The conformance test may have ended at another rate, or just after a restart of the encoder.
+    // The conformance test may have ended when the encoder had another baud rate, or just after a restart of the
+    // encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {

@@ -95,7 +95,7 @@ class Tester {
   // second reply.
   struct NextRequest {};
 
-  // The time of listening for a reply is 20 ms and the duration of 16 characters.
+  // The test listens for a reply for 20 ms plus the duration of 16 characters.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
   static constexpr unsigned times = 3;  // number of times that each test sends its command or request to the encoder

@@ -33,7 +33,8 @@ constexpr unsigned trial_turns = 2;
 // is added.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
-// An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
+// An encoder that was powered on just before the first request is assumed to reply at most this time later. tformat
+// needs 1.5 s.
 constexpr Time longest_start = std::chrono::seconds(2);
 // time limit of the readings with which other models and options are tried
 constexpr Time models_limit = std::chrono::seconds(3);

@@ -156,7 +156,7 @@ struct Suspicion {
   FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
   bool (*undo)(const Mender& mender, std::size_t& count);
-  std::size_t most_tried;      // greatest number of replies for which undoing the change is tried
+  std::size_t most_tried;      // greatest number of replies that are decoded again with the change undone
   bool of_each_reply = false;  // whether the change affects each reply, independent of its bytes
 };
 
@@ -232,8 +232,9 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
-constexpr std::size_t cheap = 24;  // greatest number of replies for which undoing a change is tried
-constexpr std::size_t dear = 10;   // greatest number of replies if undoing a change decodes each thousands of times
+constexpr std::size_t cheap = 24;  // greatest number of replies that are decoded again with a change undone
+// greatest number of replies that are decoded again, if undoing the change takes thousands of decodings for each reply
+constexpr std::size_t dear = 10;
 
 // The first change that explains the replies is reported, so changes whose search takes long come last.
 constexpr auto suspicions = std::to_array<Suspicion>({

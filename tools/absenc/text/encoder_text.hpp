@@ -42,7 +42,7 @@ void set_motion(Json& json, const Sample& sample, double unit_um);
 /// Sets the keys of `json` for the joint's speed and its uncertainty; unknown values become null. Sets no keys if the
 /// address has no settings of the joint.
 void set_joint_speed(Json& json, const Sample& sample, const Joint& joint, double unit_um);
-/// Returns the angles that follow from settings in the address, as "   joint 12.3450 deg".
+/// Returns the angles of joint and motor, for which the address has settings, as "   joint 12.3450 deg".
 [[nodiscard]] std::string angles_text(const Joint& joint, const Sample& sample);
 
 }  // namespace absenc::tool
