@@ -149,7 +149,7 @@ void translate(Instruction* instruction) {
   std::uint16_t code[2]{};
   std::memcpy(code, qemu_plugin_insn_data(instruction), qemu_plugin_insn_size(instruction));
   const bool is_long = qemu_plugin_insn_size(instruction) == 4;
-  // bx or blx instruction whose target is not in the link register
+  // the instruction is bx or blx, and its target is not in the link register
   const bool calls_register = !is_long && code[0] >> 8 == 0x47 && (code[0] >> 3 & 15) != 14;
   Executed& one = executed[address];
   one = {address, is_long ? cycles_of_long(code[0], code[1]) : cycles_of_short(code[0]), calls_register};

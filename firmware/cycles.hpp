@@ -115,8 +115,8 @@ class CycleCheck {
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
-  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time within `jitters`
-  // jitters of `time`.
+  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time that differs from
+  // `time` by at most `jitters` times the jitter.
   [[nodiscard]] bool is_near(std::uint64_t position, const Reading& reading, Time time, std::int64_t counts,
                              int jitters) const {
     const unsigned bits = reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);

@@ -26,7 +26,8 @@ struct ClauseResult {
   std::string_view paragraph{};  ///< Paragraph of the document that contains the clause.
   std::string_view words{};      ///< Requirement of the clause, in words.
   Verdict verdict{};             ///< Whether the encoder or the host complies with the clause.
-  std::string evidence{};        ///< What was observed and how often; if the clause is untested, the reason.
+  /// Observed behaviour and how often it was observed; if the clause is untested, the reason.
+  std::string evidence{};
 };
 
 /// Results of a conformance test: one for each clause of the unit's document.

@@ -103,10 +103,10 @@ class Watch {
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // the continuous position started again at the previous reading
-  bool command_runs_ = false;  // a command is running, which must not be aborted
+  bool restarted_ = false;     // whether the continuous position started again at the previous reading
+  bool command_runs_ = false;  // whether a command is running, which must not be aborted
 
-  std::jthread thread_;  // must be the last member, because the thread uses all other members
+  std::jthread thread_;  // declared last, because the thread uses all other members of this object
 };
 
 }  // namespace absenc::tool
