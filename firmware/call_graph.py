@@ -111,8 +111,9 @@ class Graph:
         for site, target in calls:
             self.calls.setdefault(site, set()).add(target)
         self.depths = {}
-        self.indirect = {}  # for each function with indirect calls, the functions that it calls indirectly
-        self.never_called = set()  # functions with indirect calls that were not made in any measurement
+        # for each function that calls others by pointers, the functions that were called so in a measurement
+        self.indirect = {}
+        self.never_called = set()  # functions that call others by pointers, but did so in no measurement
 
     def find(self, pattern):
         return [one for one in self.functions.values() if re.search(pattern, one.name)]
@@ -181,7 +182,7 @@ class Graph:
                 if goes_on:
                     waiting.append((index + 1, after))
             missing = [index for index in range(len(function.code)) if index not in reached]
-            # An instruction that no other one leads to is taken as an entry of a jump table.
+            # An instruction to which no other instruction leads is taken as an entry of a jump table.
             if not missing or not table_depths:
                 return result
             waiting.append((missing[0], table_depths[-1]))

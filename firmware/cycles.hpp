@@ -67,7 +67,7 @@ class AcceleratingShaft final : public Shaft {
   static constexpr std::int64_t start = (std::int64_t{1000} << 32) + (std::int64_t{1} << 30);
   // Returns the way 50 revolutions/s^2 * t^2 in 2^-32 revolution. The time t is `ns`, from -1 s to 1 s, in nanoseconds.
   [[nodiscard]] static constexpr std::int64_t curve(std::int64_t ns) {
-    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42, rounded
+    constexpr std::int64_t factor = 944'473;  // 50 revolutions/s^2 in 2^-32 revolution per ns^2, times 2^42, rounded
     return (ns * ns >> 20) * factor >> 22;
   }
 };
@@ -115,8 +115,8 @@ class CycleCheck {
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
-  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time within `jitters`
-  // jitters of `time`.
+  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time that differs from
+  // `time` by at most `jitters` times the jitter.
   [[nodiscard]] bool is_near(std::uint64_t position, const Reading& reading, Time time, std::int64_t counts,
                              int jitters) const {
     const unsigned bits = reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
@@ -131,13 +131,15 @@ class CycleCheck {
 
   Time jitter_;
   host::Extrapolation extrapolation_{};
-  Time latched_{};  // latch time of the last fresh reading
+  Time latched_{};  // time at which the last new and plausible reading was latched
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;
-  std::uint32_t implausible_ = 0;  // number of fresh cycles whose position is too far from the previous one
+  // number of new readings whose position the shaft cannot have reached since the reading before
+  std::uint32_t implausible_ = 0;
   std::uint32_t wrong_ = 0;
-  std::uint32_t far_ = 0;  // number of extrapolated positions that are too far from the shaft
+  // number of extrapolated positions that are farther from the true position of the shaft than allowed
+  std::uint32_t far_ = 0;
 };
 
 /// Handles the events of the line that are due, in the order of time, and sets the alarm of the timer to the next one.
@@ -193,7 +195,7 @@ class ServiceRunner {
   alignas(std::max_align_t) std::array<std::byte, 3072> storage_;
 };
 
-/// The differences between the programs cycles_tformat and cycles_biss.
+/// The values in which the programs cycles_tformat and cycles_biss differ.
 struct Plan {
   std::string_view temperature{};  ///< command that is run every second; "": none
   std::uint32_t alarm = 0;         ///< alarm that the encoder raises in each rest of the shaft; 0: none
@@ -201,7 +203,8 @@ struct Plan {
   std::int64_t page = 0;           ///< page of the encoder's memory that is written and read
   std::int64_t addresses = 0;      ///< number of addresses on each page of the memory
   std::int64_t bytes = 0;          ///< number of bytes of the encoder's memory that are written and read
-  bool takes_cycles = false;       ///< whether commands may take cycles, in which no position is read
+  /// whether a command may use a cycle for itself, so that this cycle reads no position
+  bool takes_cycles = false;
 };
 
 /// Runs commands until `cycles` cycles are over. `Bench` has the members `axis()`, which is the CyclicHost, `device()`

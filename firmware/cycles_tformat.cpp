@@ -129,7 +129,7 @@ class Bench {
   Block request_{};
   Block reply_{};
   bool is_silent_ = false;
-  bool is_disturbed_ = false;  // drive and encoder have sent at the same time
+  bool is_disturbed_ = false;  // whether drive and encoder have sent at the same time, which destroys the bytes of both
   Time now_{};
   Random random_{};
   std::uint32_t faults_ = 0;

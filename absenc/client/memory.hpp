@@ -108,7 +108,7 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory in three steps: look, write, verify. They throw the exceptions of Memory.
+/// A change of the memory in three steps: `look`, `write`, `verify`. These functions throw the exceptions of Memory.
 class MemoryChange {
  public:
   /// Prepares the change without sending anything. Throws UsageError.

@@ -38,7 +38,7 @@ struct Axis {
   // The carrier calls `hold_clock`, `begin` and `result`. The clock's level in the pause is a bit for the encoder.
   void hold_clock(bool low) { set_clock(!low); }
   void begin(const ByteStep& step) {
-    // the only other step is a change of the clock rate, which is not needed here
+    // besides transfers, the only kind of step is a change of the clock rate, which is not needed here
     if (step.kind != ByteStep::Kind::transfer) return;
     bytes = std::min((step.bits + 7) / 8, samples.size());
     spi_receive(MutableBytes(samples).first(bytes));

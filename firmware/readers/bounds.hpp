@@ -16,7 +16,7 @@
 
 namespace absenc::firmware {
 
-/// A copy of the items of a reply. The reply must fit into its buffer.
+/// A copy of the bytes or frames of a reply. The reply must fit into its buffer.
 template <class Item>
 class LineContent {
  public:
@@ -67,8 +67,8 @@ void damage(CanFrame& frame, const Visit& visit) {
   frame = sound;
 }
 
-/// Calls `visit` with `reply`, with damaged and truncated copies of it, with further items before and after it, and
-/// with two replies in a row.
+/// Calls `visit` with `reply`, with damaged and truncated copies of it, with further bytes or frames before and after
+/// it, and with two replies in a row.
 template <class Item, class Visit>
 void vary(std::span<const Item> reply, const Visit& visit) {
   static LineContent<Item> line;

@@ -50,7 +50,7 @@ class Protocol:
         self.fields: list[str] = description["fields"]
         self.conditions: list[str] = description["conditions"]  #: names of the conditions of its virtual encoder
         self.flags: list[Flag] = [Flag(*flag) for flag in description["flags"]]  #: flags of all alarm and status fields
-        # if a status flag and an alarm have the same name, the first flag counts
+        # if a status flag and an alarm have the same name, `named` has the one that comes first in `flags`
         named = {flag.name: flag for flag in reversed(self.flags)}
         self.alarms: list[Flag] = [named[name] for name in description["alarms"]]
         self.commands: dict[str, Command] = {
