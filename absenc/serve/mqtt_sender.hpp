@@ -22,7 +22,7 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All arguments must outlive this object. Throws what the constructor of MqttClient throws.
+  /// All arguments must outlive this object. Throws client::Failure or os::Failure if no MQTT client process can start.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Ends the sender thread. A connected broker has one second to receive the remaining messages.
   ~MqttSender();
@@ -93,7 +93,7 @@ class MqttSender {
   mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   Figures figures_;
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve
