@@ -39,7 +39,7 @@ struct MqttIdentity {
 /// A connection to a broker through the MQTT client process. Not thread-safe.
 class MqttClient {
  public:
-  /// Starts the MQTT client process. Throws client::Failure or os::Failure.
+  /// Starts the MQTT client process. Throws client::Failure or os::Failure if it cannot start or cannot use `broker`.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;

@@ -22,7 +22,8 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All arguments must outlive this object. Throws client::Failure or os::Failure if no MQTT client process can start.
+  /// All arguments must outlive this object. Throws client::Failure or os::Failure if an MQTT client process cannot
+  /// start or cannot use the settings.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Ends the sender thread. A connected broker has one second to receive the remaining messages.
   ~MqttSender();
