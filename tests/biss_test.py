@@ -418,7 +418,7 @@ class LifeCounter(Case):
                 self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
                 self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
                 self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
-                # The frame after a damaged one may have any counter except that of the last good frame.
+                # The frame after a damaged one may have any life counter except that of the last good frame.
                 damaged = of([1, 2, 3, 5])
                 damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
                 self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])

@@ -182,8 +182,8 @@ class Tree:
         """Returns, for each source, the constants that can become functions."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            # Constants of the folder author may be used in every unit, so users are searched in all folders of
-            # protocols.
+            # Constants of absenc/protocol/author may be used in every unit, so users of such a constant are searched in
+            # all folders of absenc/protocol.
             folder = path.parent.parent if path.parent.name == "author" else path.parent
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]

@@ -46,7 +46,7 @@ class Access {
   /// Returns the response to a request with a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
-  /// Returns the number of requests with a wrong token since the start.
+  /// Returns the number of requests with a wrong token since the server started.
   [[nodiscard]] std::uint64_t wrong_tokens() const;
 
  private:

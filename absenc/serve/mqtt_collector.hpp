@@ -27,7 +27,7 @@ class MqttCollector {
 
   struct Figures {
     std::string trouble{};      // why the spool cannot be written; "" without an error
-    std::uint64_t dropped = 0;  // number of readings lost since the start
+    std::uint64_t dropped = 0;  // number of readings lost since this object was made
     bool drops = false;         // whether readings were dropped within the last 30 seconds
     // number of the last reading that is in the spool on disk or was sent, by name of the encoder
     std::map<std::string, std::uint64_t> taken{};

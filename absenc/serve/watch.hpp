@@ -68,7 +68,7 @@ struct RaisedAlarm {
 /// A copy of the state of an encoder at one time.
 struct Snapshot {
   State state = State::opening;
-  Time age{};  // age of the last reading; before the first reading, time since the start
+  Time age{};  // age of the last reading; before the first reading, time since the `Watch` was made
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, continued as in `Point`; degrees or mm
   client::Sample last{};          // last reading; current only in state `live`
