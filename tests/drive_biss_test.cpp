@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the BiSS drive of docs/drive.md with a virtual encoder at the other end of the line.
+// Tests the program of docs/drive.md for a drive with a BiSS encoder; a virtual encoder is at the other end of the
+// line.
 #include "firmware/hookup/drive_biss.cpp"
 
 #include <gtest/gtest.h>

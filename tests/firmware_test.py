@@ -226,7 +226,7 @@ class FloatingPoint(unittest.TestCase):
                 self.assertEqual(self.soft_functions(reader), [])
 
     def test_all_units_together_link_some(self):
-        # The search does find such functions in a program of units that have fields with real numbers.
+        # Checks the search itself: it finds soft-float functions in a program of units that have real-number fields.
         found = self.soft_functions("vectors-m0plus")
         self.assertIn("__aeabi_dmul", found)
         self.assertIn("__floatdidf", found)
@@ -324,8 +324,8 @@ class CallGraph(unittest.TestCase):
                         program = os.path.join(FOLDER, f"reader-{reader}-{cpu}.elf")
                         printed, measured = figures.run(plugin, program, cpu, "count")
                         graph = figures.graph_of(program, printed)
-                        # the functions of the machine run before or after the measurement, so their stack does not
-                        # count
+                        # the functions of the namespace absenc::machine run before or after the measurement, so their
+                        # stack does not count
                         for function in graph.find("machine"):
                             graph.depths[function.address] = 0
                         computed = graph.depth(graph.find("^start$")[0])

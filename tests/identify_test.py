@@ -261,7 +261,8 @@ class Frames(Case):
         result, found = identify(*[argument for word in moving for argument in ("--hex", word)])
         self.assertEqual(result.returncode, 0, result.stdout)
         self.assertEqual(found["candidates"][0]["protocol"], "ssi")
-        # No turns are in these words, so identify must not list a candidate for each place at which turns could be.
+        # These SSI words contain no turns, so identify must not list a candidate for each bit at which turns could
+        # begin.
         ssi = [one["options"] for one in found["candidates"] if one["protocol"] == "ssi"]
         self.assertEqual({options["multiturn_first"] for options in ssi}, {ssi[0]["multiturn_first"]})
 

@@ -73,7 +73,7 @@ class Recording(Case):
         return path
 
     def assert_motion(self, rows):
-        # Rows for gaps are left out, because a busy machine may cause gaps.
+        # Rows that mark gaps between readings are left out, because a busy machine may cause gaps.
         rows = [row for row in rows if row.get("event") != "gap"]
         first = rows[0]
         for row in rows[5:]:

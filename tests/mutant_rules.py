@@ -25,11 +25,7 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that end an operand of `&&` or `
-#
-# `; brackets, `&&` and `
-#
-# ` end it, too.
+# Tokens that end an operand of `&&` or `||`; brackets, `&&` and `||` themselves end an operand, too.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # rules that change arithmetic; they make at most one mutant for a line
@@ -52,7 +48,7 @@ class Switch(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    file: str  # path of the source file, relative to the folder of sources, as in the id
+    file: str  # path of the source file, relative to the folder of all sources
     rule: str
     line: int
     start: int
@@ -70,7 +66,7 @@ class Mutant(NamedTuple):
 
 def with_switches(text, numbered):
     """Returns `text` with the switches inserted. `numbered`: pairs of number and mutant."""
-    # If one mutant is inside another, its switch is inserted inside the switch of the other.
+    # If the code of one mutant is part of the code of another, its switch is inserted inside the switch of the other.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -181,7 +177,7 @@ class Finder:
         before = self.source.text[start:end]
         self.found.append(Mutant(self.file, rule, line, start, end, before, after, name, switch, constant))
 
-    # ---- Checks
+    # ---- Mutants of checks
 
     def _find_checks(self):
         source = self.source
@@ -306,7 +302,7 @@ class Finder:
             self._mark(first, last)
             self._never(first, last, "&&", "true")
 
-    # ---- Constants
+    # ---- Mutants of constants
 
     def _declared_times(self):
         """Adds mutants of each `constexpr Time name = ...;` and of each `Time name = literal;`."""

@@ -14,17 +14,17 @@ namespace {
 
 /// Result of a run of cycles, with at most one command as service.
 struct Ride {
-  bool is_over = false;     // whether the service has ended
-  bool is_refused = false;  // whether the service was refused
-  Time needs{};             // time that the refused request would need, in nanoseconds
+  bool is_over = false;     // whether the command has ended or was refused
+  bool is_refused = false;  // whether the command was refused, because its request does not fit between two positions
+  Time needs{};             // time in nanoseconds that this request would need between two positions
   Error error = Error::none;
   ReportedFields seen{};
   unsigned fresh = 0;
   unsigned repeated = 0;
-  unsigned unanswered = 0;  // cycles in which the encoder did not answer
-  unsigned others = 0;      // cycles whose position is neither fresh nor repeated, although the encoder answered
+  unsigned unanswered = 0;  // number of cycles in which the encoder did not answer
+  unsigned others = 0;      // number of answered cycles whose position is neither fresh nor repeated
   std::string other{};      // kind or error of the first cycle counted in `others`
-  unsigned wrong = 0;       // fresh cycles with another position than the shaft's
+  unsigned wrong = 0;       // number of fresh cycles with another position than the shaft's
   std::uint32_t violations = 0;
   std::uint32_t changes = 0;  // number of changes of the encoder's memory
 };
@@ -90,8 +90,8 @@ class Rides {
     const auto what = [&](const char* pace) {
       return configuration_.text + ", " + std::string(command.name) + " " + pace + ": ";
     };
-    // If the request of a command is refused, the period of the cycles is extended by the time that it needs. A row
-    // of requests is refused at any period.
+    // If the request of a command does not fit between two positions, the period of the cycles is extended by the time
+    // that the request needs. Requests that must be alone on the line (`Step::holds_line`) are refused at any period.
     plan_.period = 2 * position_time_;
     Ride wide = ride(command, arguments, false);
     for (int i = 0; i < 4 && wide.is_refused && wide.needs < std::chrono::hours(1); ++i) {
@@ -241,8 +241,8 @@ Findings check_cycles(const Unit& unit) {
   unsigned runs = 0;
   unsigned services = 0;
   unsigned took = 0;
-  // The configurations of the models are run first; only if `read` is one request in none of them, those of the test
-  // vectors.
+  // The configurations of the models are run first. Those of the test vectors are run only if `read` sends several
+  // requests with every model.
   for (const bool of_models : {true, false}) {
     for (const Configuration& configuration : of_models ? configurations(unit) : configurations_of_vectors(unit)) {
       const bool streams = unit.streams != nullptr && unit.streams(configuration.options);

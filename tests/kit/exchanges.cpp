@@ -94,7 +94,7 @@ class Campaign {
   }
 
  private:
-  /// A command with its results on an undamaged line, by the index of the shaft's position; empty if not recorded.
+  /// A command and, for each position of the shaft, its result on a line without faults; no result if not recorded.
   struct Query {
     const Command* command;
     Values arguments;
@@ -300,7 +300,8 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Options that are not a model's are part of the key, because they may select another frame check.
+  // Returns the key of the counters of a command: its name, and its options unless these are a model's. Other options
+  // may select another frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
     return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
@@ -317,7 +318,7 @@ class Campaign {
     }
   }
 
-  // Returns whether the command has a reply without a check, in which no bit is covered.
+  // Returns whether the command has a reply in which a frame check covers no bit.
   bool is_unchecked(const Query& query) {
     std::optional<bool>& unchecked = tally_.commands[counter_key(query)].unchecked;
     if (unchecked) return *unchecked;

@@ -105,7 +105,8 @@ struct VectorReplay {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
-    // Only a command with one request is compared: others may send a further request after a good reply.
+    // The error is compared only for a command with one request: after a good reply, other commands may send a further
+    // request, which gets no reply here.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
@@ -169,8 +170,8 @@ struct VectorReplay {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // Sends seven good frames with `odd` between them, frame by frame and again byte by byte. Returns the number of
-  // good results.
+  // Runs a stream of seven good frames, with the frame `odd` between them, frame by frame and again byte by byte.
+  // Returns the number of good results.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -319,7 +320,8 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-/// A conversation of `read`, run until it waits for the reply to its first request, or does not wait.
+/// A conversation of the command `read`, which has been run until it waits for the reply to its first request, or until
+/// it is clear that it does not wait for a reply.
 template <class Item>
 class Asked {
  public:

@@ -19,8 +19,8 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// A function that returns the reply to the request under test, in pieces. `clocks`: number of clocks of the host;
-  /// 0 if unknown.
+  /// A function that returns the reply to the request under test, in pieces. `clocks`: number of bits that the host
+  /// clocks for the reply; 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
   /// Creates a player without a virtual encoder: only the request under test gets a reply.

@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Whether the position that was decoded from a damaged reply is wrong, and whether other fields are.
+/// States whether the position that was decoded from a damaged reply is wrong, and whether other fields are wrong.
 struct WrongValues {
   bool position = false;
   bool others = false;

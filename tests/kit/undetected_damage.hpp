@@ -10,7 +10,7 @@
 
 namespace absenc::kit {
 
-/// Number of damaged replies, and how many of these decoded to a wrong value.
+/// Number of damaged replies, and how many of these were accepted and decoded to a wrong value.
 struct DamageCount {
   std::uint64_t damaged = 1;
   std::uint64_t wrong = 0;
@@ -32,14 +32,14 @@ struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};
 
-  /// Replaces each count by that of `other` if the rate of `other` is higher.
+  /// Replaces each count by that of `other` if a greater share of the damaged replies of `other` was undetected.
   void add(const UndetectedDamage& other) {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;
   }
 };
 
-/// Returns the rates measured with `samples` replies.
+/// Damages copies of `reply`, `samples` times in all, and counts those that decode to wrong values.
 [[nodiscard]] UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options,
                                                          const OwnedFrame& request, const OwnedFrame& reply,
                                                          const sim::FaultRates& rates, unsigned samples);
