@@ -7,7 +7,7 @@ set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
 # Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
-# in absenc/os/cuse are included only if that folder is given.
+# in absenc/os/linux/cuse are included only if that folder is given.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)
@@ -18,8 +18,8 @@ function(absenc_sources result)
     list(APPEND found ${sources})
   endforeach()
   list(FILTER found EXCLUDE REGEX "_(test|fuzz|bench)\\.cpp$")
-  if(NOT "absenc/os/cuse" IN_LIST ARGN)
-    list(FILTER found EXCLUDE REGEX "/absenc/os/cuse/")
+  if(NOT "absenc/os/linux/cuse" IN_LIST ARGN)
+    list(FILTER found EXCLUDE REGEX "/absenc/os/linux/cuse/")
   endif()
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()

@@ -13,7 +13,7 @@
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/core/crc.hpp"
-#include "absenc/os/fake_spi_test.hpp"
+#include "absenc/os/linux/fake_spi_test.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {

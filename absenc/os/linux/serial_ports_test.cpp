@@ -14,7 +14,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "absenc/os/testing.hpp"
+#include "absenc/os/linux/testing.hpp"
 
 namespace absenc::os {
 

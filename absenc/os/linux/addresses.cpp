@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/os/addresses.hpp"
+#include "absenc/os/linux/addresses.hpp"
 
 #include "absenc/os/error.hpp"
 

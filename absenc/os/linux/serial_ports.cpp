@@ -13,8 +13,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "absenc/os/linux/sys_file.hpp"
 #include "absenc/os/served_port.hpp"
-#include "absenc/os/sys_file.hpp"
 
 namespace absenc::os {
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/os/cuse/spidev_node.hpp"
+#include "absenc/os/spidev_node.hpp"
 
 #include <fcntl.h>
 #include <fuse3/cuse_lowlevel.h>
-#include <poll.h>
 
 #include <algorithm>
 #include <array>
@@ -142,7 +141,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
   static_cast<void>(control.release());
 
   while (!made_) {
-    pollfd readable{fuse_session_fd(session_.get()), POLLIN, 0};
+    Watched readable{.descriptor = fuse_session_fd(session_.get())};
     wait_for({&readable, 1}, never);
     process_one();
   }
@@ -159,7 +158,7 @@ SpidevNode::~SpidevNode() {
 
 void SpidevNode::serve(Time end) {
   for (;;) {
-    pollfd readable{fuse_session_fd(session_.get()), POLLIN, 0};
+    Watched readable{.descriptor = fuse_session_fd(session_.get())};
     const bool ready = wait_for({&readable, 1}, std::min(end, spidev_->device().timer()));
     const Time time = now();
     if (time >= end) return;

@@ -6,8 +6,8 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {

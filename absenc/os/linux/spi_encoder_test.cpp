@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absenc/host/drive.hpp"
-#include "absenc/os/fake_spi_test.hpp"
+#include "absenc/os/linux/fake_spi_test.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
 #include "absenc/protocol/biss/unit.hpp"
 #include "absenc/protocol/encolink/device.hpp"

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <thread>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/input.hpp"
 
-#include <poll.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,7 +12,7 @@ namespace absenc::os {
 
 std::optional<std::size_t> read_standard_input(MutableBytes into, Time deadline) {
   for (;;) {
-    pollfd input{STDIN_FILENO, POLLIN, 0};
+    Watched input{.descriptor = STDIN_FILENO};
     if (!wait_for({&input, 1}, deadline)) return std::nullopt;
     const ssize_t size = ::read(STDIN_FILENO, into.data(), into.size());
     if (size >= 0) return static_cast<std::size_t>(size);

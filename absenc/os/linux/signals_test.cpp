@@ -7,8 +7,8 @@
 #include <csignal>
 #include <thread>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/stream_port.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {
@@ -70,7 +70,7 @@ TEST_F(Signals, EndWaitOnBusyLine) {
   ASSERT_EQ(::pipe(ends.data()), 0);
   const Descriptor reader(ends[0]), writer(ends[1]);
   put(writer.get(), {1});
-  std::array<pollfd, 1> watched{{{reader.get(), POLLIN, 0}}};
+  std::array<Watched, 1> watched{{{.descriptor = reader.get()}}};
   ASSERT_TRUE(wait_for(watched, never));
   std::raise(SIGTERM);
   EXPECT_THROW(wait_for(watched, never), Interrupted);
@@ -109,11 +109,12 @@ TEST(WaitFor, ReportsReadyDescriptorsAfterTheDeadline) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
   const Descriptor reader(ends[0]), writer(ends[1]);
-  std::array<pollfd, 1> watched{{{reader.get(), POLLIN, 0}}};
+  std::array<Watched, 1> watched{{{.descriptor = reader.get()}}};
   EXPECT_FALSE(wait_for(watched, Time{}));
   put(writer.get(), {1});
   EXPECT_TRUE(wait_for(watched, Time{}));
-  EXPECT_EQ(watched[0].revents, POLLIN);
+  EXPECT_TRUE(watched[0].ready.to_read);
+  EXPECT_FALSE(watched[0].ready.to_write);
 }
 
 }  // namespace

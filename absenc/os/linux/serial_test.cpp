@@ -12,8 +12,8 @@
 #include <cstring>
 #include <fstream>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "absenc/host/drive.hpp"
 #include "absenc/os/emulator_port.hpp"
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {

@@ -13,10 +13,10 @@
 #include <memory>
 #include <string>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/spi_port.hpp"
 #include "absenc/os/spidev.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os::testing {
 

@@ -13,10 +13,10 @@
 #include <memory>
 #include <thread>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/tcp.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {

@@ -74,9 +74,11 @@ int CanKernel::bind(int descriptor, int index) {
   return ::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address);
 }
 
-ssize_t CanKernel::write(int descriptor, const can_frame& frame) { return ::write(descriptor, &frame, sizeof frame); }
+std::ptrdiff_t CanKernel::write(int descriptor, const can_frame& frame) {
+  return ::write(descriptor, &frame, sizeof frame);
+}
 
-ssize_t CanKernel::read(int descriptor, can_frame& frame, std::optional<Time>& stamp) {
+std::ptrdiff_t CanKernel::read(int descriptor, can_frame& frame, std::optional<Time>& stamp) {
   iovec part{&frame, sizeof frame};
   alignas(cmsghdr) std::array<char, 128> control{};
   msghdr message{};
@@ -84,7 +86,7 @@ ssize_t CanKernel::read(int descriptor, can_frame& frame, std::optional<Time>& s
   message.msg_iovlen = 1;
   message.msg_control = control.data();
   message.msg_controllen = control.size();
-  const ssize_t size = ::recvmsg(descriptor, &message, 0);
+  const std::ptrdiff_t size = ::recvmsg(descriptor, &message, 0);
   if (size < 0) return size;
   stamp.reset();
   for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr; part_of = CMSG_NXTHDR(&message, part_of)) {
@@ -179,14 +181,14 @@ void SocketCan::collect(Time deadline) {
   for (std::size_t i = 0; i < most_at_once; ++i) {
     can_frame frame{};
     std::optional<Time> stamp;
-    const ssize_t size = kernel_->read(socket_.get(), frame, stamp);
+    const std::ptrdiff_t size = kernel_->read(socket_.get(), frame, stamp);
     if (size < 0 && errno == EINTR) return;
     if (size < 0 && errno == EAGAIN) return stamps_.found_empty(before);
     if (size < 0) fail("reading from " + interface_, errno);
     const ClockPair after = kernel_->clocks();
     const StampedTime at = stamps_.convert(stamp, std::exchange(before, after), after);
     // a frame of this size is a CAN FD frame, which is not enabled
-    if (size != static_cast<ssize_t>(sizeof frame)) continue;
+    if (size != static_cast<std::ptrdiff_t>(sizeof frame)) continue;
     if ((frame.can_id & CAN_ERR_FLAG) != 0) {
       take_error(frame, at);
     } else {
@@ -225,7 +227,7 @@ void SocketCan::send(const CanFrame& from) {
   std::copy_n(from.data.begin(), from.size, frame.data);
   const Time limit = os::now() + queue_patience;
   for (;;) {
-    if (kernel_->write(socket_.get(), frame) == static_cast<ssize_t>(sizeof frame)) return;
+    if (kernel_->write(socket_.get(), frame) == static_cast<std::ptrdiff_t>(sizeof frame)) return;
     // The write is repeated, because poll(2) does not report when a full queue (ENOBUFS) has room again.
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);

@@ -8,7 +8,7 @@
 
 #include <numeric>
 
-#include "absenc/os/fake_spi_test.hpp"
+#include "absenc/os/linux/fake_spi_test.hpp"
 #include "absenc/os/signals.hpp"
 #include "tests/shape_toys.hpp"
 

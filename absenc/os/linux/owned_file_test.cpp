@@ -9,7 +9,7 @@
 #include <iterator>
 
 #include "absenc/os/error.hpp"
-#include "absenc/os/testing.hpp"
+#include "absenc/os/linux/testing.hpp"
 
 namespace absenc::os {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <fstream>
 
-#include "absenc/os/fake_can_test.hpp"
+#include "absenc/os/linux/fake_can_test.hpp"
 
 namespace absenc::os {
 namespace {

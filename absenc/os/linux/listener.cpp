@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <string>
 
-#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/addresses.hpp"
 
 namespace absenc::os {
 

@@ -17,9 +17,9 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/socketcan.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os::testing {
 
@@ -50,7 +50,7 @@ class FakeCan final : public CanKernel {
     bound = index;
     return bind_error == 0 ? 0 : refuse(bind_error);
   }
-  ssize_t write(int, const can_frame& frame) override {
+  std::ptrdiff_t write(int, const can_frame& frame) override {
     if (!write_errors.empty()) {
       const int error = write_errors.front();
       if (write_errors.size() > 1 || !keep_last_error) write_errors.pop_front();
@@ -60,9 +60,9 @@ class FakeCan final : public CanKernel {
     written_at = now();
     return sizeof frame;
   }
-  ssize_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp) override {
+  std::ptrdiff_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp) override {
     if (read_error != 0) return refuse(read_error);
-    const ssize_t size = ::recv(descriptor, &frame, sizeof frame, 0);
+    const std::ptrdiff_t size = ::recv(descriptor, &frame, sizeof frame, 0);
     stamp.reset();
     if (has_stamps) stamp = now() - age + lead;
     lead += std::exchange(clock_step, Time{});

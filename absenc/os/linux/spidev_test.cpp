@@ -11,7 +11,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "absenc/os/testing.hpp"
+#include "absenc/os/linux/testing.hpp"
 #include "tests/shape_toys.hpp"
 
 namespace absenc::os {

@@ -8,8 +8,8 @@
 #include <array>
 #include <cerrno>
 
-#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/addresses.hpp"
 #include "absenc/os/listener.hpp"
 
 namespace absenc::os {

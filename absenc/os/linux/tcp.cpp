@@ -7,8 +7,8 @@
 
 #include <cerrno>
 
-#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/addresses.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -23,7 +23,7 @@ int connect_to(const addrinfo& address, Time deadline, Descriptor& descriptor) {
   if (!descriptor) return errno;
   if (::connect(descriptor.get(), address.ai_addr, address.ai_addrlen) == 0) return 0;
   if (errno != EINPROGRESS) return errno;
-  pollfd connected{descriptor.get(), POLLOUT, 0};
+  Watched connected{.descriptor = descriptor.get(), .wanted = {.to_write = true}};
   if (!wait_for({&connected, 1}, deadline)) return ETIMEDOUT;
   int error = 0;
   socklen_t size = sizeof error;
@@ -69,6 +69,8 @@ TcpPort::TcpPort(const std::string& host, std::uint16_t port)
 }
 
 // Unlike write(2), send(2) with MSG_NOSIGNAL raises no SIGPIPE after the other side has closed.
-ssize_t TcpPort::write_some(Bytes bytes) { return ::send(descriptor(), bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+std::ptrdiff_t TcpPort::write_some(Bytes bytes) {
+  return ::send(descriptor(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+}
 
 }  // namespace absenc::os

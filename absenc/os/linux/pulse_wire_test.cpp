@@ -8,9 +8,9 @@
 
 #include <cerrno>
 
+#include "absenc/os/linux/testing.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/testing.hpp"
 
 namespace absenc::os {
 namespace {
