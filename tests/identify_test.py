@@ -49,7 +49,7 @@ def usual(unit, settings):
 
 
 # Encoders on clocked and SPI links are left out, because they need an SPI controller.
-ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
+ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked", "clocked_bidirectional") for case in cases(unit)]
 
 # Time limit of an identify search in seconds, long enough for a busy machine.
 SEARCH = 300

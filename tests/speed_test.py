@@ -17,7 +17,7 @@ OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bu
 def serial_units():
     """Returns the names of the units whose emulator runs on a pseudo-terminal."""
     units = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
-    return [unit["protocol"] for unit in units if unit["link"] not in ("exchange", "clocked")]
+    return [unit["protocol"] for unit in units if unit["link"] not in ("exchange", "clocked", "clocked_bidirectional")]
 
 
 class Speed(EncoderCase):

@@ -56,9 +56,10 @@ struct Character {
 struct Burst {
   Tick begin = 0;
   Tick end = 0;
-  std::size_t bits = 0;           // number of clocks in the burst
-  std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
-  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed MSB first, the last byte left-aligned
+  std::size_t bits = 0;          // number of clocks in the burst
+  std::vector<std::uint8_t> in;  // bits sent by the encoder, packed MSB first, the last byte left-aligned
+  // SPI, and bidirectional clocked links with a wire of their own: bits sent by the host, packed like `in`
+  std::vector<std::uint8_t> out;
   // true: bits of the burst may be missing at its beginning or end
   bool cut = false;
   // The following members are used only for clocked words without chip select.
@@ -69,6 +70,11 @@ struct Burst {
   bool has_last = false;  // true: `last` is known
   // level behind the last clock change, where a host with one clock per bit takes its last bit
   bool last = false;
+  // levels of the encoder's data line one, two ... clock periods after `last`, the first as the highest of `tail_bits`
+  std::uint32_t tail = 0;
+  std::uint8_t tail_bits = 0;
+  // bidirectional clocked links: levels of the direction wire, packed like `in`; empty: it was not captured
+  std::vector<std::uint8_t> direction{};
 };
 
 struct CanRecord {

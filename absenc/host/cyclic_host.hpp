@@ -406,7 +406,8 @@ void CyclicHost<Item, Read>::limit(Step<Item>& step, Time now) const {
 // Returns the duration of the items of a transfer and its reply, or of a pulse.
 template <class Item, class Read>
 Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
-  const LineSettings line = plan_.line.with_some_rate();
+  LineSettings line = plan_.line.with_some_rate();
+  if (step.rate != 0) line.rate = step.rate;
   if (step.kind == Kind::pulse) return step.width;
   if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
   if constexpr (is_can) {

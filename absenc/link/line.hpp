@@ -46,6 +46,7 @@ struct LineSettings {
   std::uint8_t spi_mode = 0;     ///< SPI and clocked links: clock mode, 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};            ///< SPI: minimum time from chip select to the first clock
+  Time delay{};                  ///< bidirectional clocked: delay of line and transceivers, there and back
   /// Highest rate in bits per second that the encoder's document allows; 0: not stated.
   std::uint32_t highest_rate = 0;
 

@@ -123,6 +123,7 @@ void RoughLine<Item>::exchange_bits(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     using Kind = typename Event<Item>::Kind;
     const Time start = time_;
+    if (step.rate != 0) settings_.rate = step.rate;
     if (!std::exchange(goes_on_, step.goes_on)) {
       clocks_ = driven_from_ = 0;
       out_.clear();

@@ -43,7 +43,7 @@ class Protocol:
         self.id: str = description["id"]
         self.name: str = description["name"]  #: maker and protocol, for people
         self.document: str = description["document"]  #: document that specifies the protocol
-        self.link: str = description["link"]  #: kind of link: "half_duplex", "full_duplex", "exchange" (SPI), "clocked" or "can"
+        self.link: str = description["link"]  #: kind of link: "half_duplex", "full_duplex", "exchange" (SPI), "clocked", "clocked_bidirectional" or "can"
         self.line: str = description["line"]  #: kind of line: "RS-485 half duplex, 2.5 Mbit/s"
         self.options: list[str] = description["options"]
         self.models: list[str] = description["models"]

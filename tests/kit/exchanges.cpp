@@ -394,6 +394,12 @@ std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Q
   });
   world.line().observe_transfers([&](const typename World<Item>::Line::Transfer& transfer) {
     if constexpr (!World<Item>::is_can) {
+      if (unit_.link == LinkKind::clocked_bidirectional) {
+        if (transfer.goes_on_from == never) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
+        frames.back().first.append({transfer.out, transfer.out_bits});
+        frames.back().second.append({transfer.in, transfer.bits - transfer.out_bits});
+        return;
+      }
       const bool clocked = unit_.link == LinkKind::clocked;
       OwnedFrame reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
       if (clocked) reply.bits = transfer.bits;

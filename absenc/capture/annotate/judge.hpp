@@ -63,6 +63,9 @@ class Judge {
     return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
 
+  /// Returns the ranges of bits of a burst that the host sends; see Unit::host_bits.
+  [[nodiscard]] BitRanges host_bits(const Frame& burst) const { return unit_->host_bits(options_, burst); }
+
   [[nodiscard]] bool is_answered(const Frame& request) const {
     return unit_->is_answered == nullptr || unit_->is_answered(options_, request);
   }

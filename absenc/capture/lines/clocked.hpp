@@ -21,6 +21,10 @@ struct ClockedFormat {
   Tick settle = 0;
   // without chip select: like `pause`, but for rests in which the data line changes; 0: unused
   Tick change_pause = 0;
+  // without chip select: number of samples behind that of the last bit, a clock period apart, for a line with a delay
+  std::uint8_t tail = 0;
+  // without chip select: a rest of the clock at its low level never ends a word
+  bool low_goes_on = false;
 };
 
 /// Lengths of the rests of a clock between words, measured in the first changes of the clock.
@@ -34,12 +38,13 @@ struct ClockRests {
 /// Measures the rests of a clock; returns nothing if the clock has too few changes.
 std::optional<ClockRests> find_rests(const Changes& clock);
 
-/// A part of the capture with the changes of its wires. `in`, `out` and `select` may be null.
+/// A part of the capture with the changes of its wires. All but `clock` may be null.
 struct ClockedPart {
   const Changes* clock;
   const Changes* in = nullptr;
   const Changes* out = nullptr;
   const Changes* select = nullptr;
+  const Changes* direction = nullptr;
   Tick first = 0;
   Tick end = 0;
 };
@@ -90,16 +95,18 @@ class ClockedDecoder {
   void take(Tick at, std::vector<Burst>& bursts);
   void detect_data_change(Tick until);
   [[nodiscard]] bool is_over(Tick rest) const;
-  void sample_last_bit();
+  void sample_last_bits(Tick until);
 
   ClockedFormat format_;
   bool begun_ = false;
   bool has_in_ = false;
   bool has_out_ = false;
+  bool has_direction_ = false;
   Wire clock_;
   Wire in_;
   Wire out_;
   Wire select_;
+  Wire direction_;
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;

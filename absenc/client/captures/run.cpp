@@ -233,11 +233,17 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   const bool spi = unit_.link == LinkKind::spi;
+  const bool turns = unit_.link == LinkKind::clocked_bidirectional;
   capture::ClockedLine line{.clock = *wires.wires[0],
                             .in = wires.wires[1],
-                            .out = spi ? wires.wires[2] : std::nullopt,
+                            .out = spi || turns ? wires.wires[2] : std::nullopt,
                             .select = spi ? wires.wires[3] : std::nullopt,
-                            .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
+                            // At a falling edge both host and encoder have driven their bit for half a period.
+                            .rising = !turns && (line_.spi_mode == 0 || line_.spi_mode == 3),
+                            .direction = turns ? wires.wires[3] : std::nullopt,
+                            .low_goes_on = turns,
+                            .delay = static_cast<Tick>(static_cast<double>(line_.delay.count()) * 1e-9 *
+                                                       static_cast<double>(ticks_per_second()))};
   CaptureOutcome outcome;
   Guard guard;
   line.choose = [&](std::span<const capture::PauseReading> readings) { return likely_pause(readings, outcome.notes); };

@@ -46,10 +46,6 @@ ByteStep BitEngine::next(Time now) {
   } else if (state_ == State::ending || state_ == State::over) {
     state_ = State::over;
     step.kind = ByteStep::Kind::done;
-  } else if (state_ == State::ready && rate_ != request_.rate) {
-    rate_ = request_.rate;
-    step.kind = ByteStep::Kind::configure;
-    step.rate = rate_;
   } else if (state_ != State::clocking && state_ != State::added) {
     begin_transfer(step, now);
   }
@@ -59,6 +55,7 @@ ByteStep BitEngine::next(Time now) {
 void BitEngine::begin_transfer(ByteStep& step, Time now) {
   step.kind = ByteStep::Kind::transfer;
   step.holds_line = manner_.holds_line;
+  step.rate = request_.rate;
   step.at = now;
   out_.clear();
   if (state_ == State::ready) {
@@ -83,6 +80,10 @@ void BitEngine::begin_transfer(ByteStep& step, Time now) {
     awaited_ = 1;  // the encoder gets no supplement to a reply that is not understood
     state_ = State::added;
   }
+  if (step.goes_on && request_.rate != 0) {
+    const std::size_t rest = request_.late_clocks + request_.supplement.size();
+    step.width = Time(1'000'000'000u / request_.rate) * static_cast<std::int64_t>(rest);
+  }
   step.out = out_.bytes();
   step.out_bits = out_.size();
   step.bits = out_.size() + awaited_;
@@ -97,7 +98,7 @@ void BitEngine::feed(const ByteEvent& event) {
     received_at_ = event.at;
     if (size_ == 0 && awaited_ != 0) {
       // Computed with 32 bits, because a processor without division is slow with 64.
-      const auto period = Time(rate_ != 0 ? 1'000'000'000u / rate_ : 0u);
+      const auto period = Time(request_.rate != 0 ? 1'000'000'000u / request_.rate : 0u);
       begun_at_ = event.at - period * static_cast<std::int64_t>(out_.size() + awaited_);
       sent_at_ = event.at - period * static_cast<std::int64_t>(awaited_);
     }

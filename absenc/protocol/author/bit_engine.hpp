@@ -22,8 +22,9 @@ struct BitRequest {
   /// Number of clocks behind the request. With a supplement: as few as a complete reply can need; the host then clocks
   /// on until the reply is complete.
   std::size_t clocks = 0;
-  std::uint32_t rate = 0;  ///< Rate of the clock in Hz.
-  Time rest{};             ///< Shortest time from the last exchange to this one.
+  std::size_t late_clocks = 0;  ///< With a supplement: most clocks by which the reply is expected to be later.
+  std::uint32_t rate = 0;       ///< Rate of the clock in Hz.
+  Time rest{};                  ///< Shortest time from the last exchange to this one.
 
   /// Returns whether there are no bits to send: the request has no encoding.
   [[nodiscard]] constexpr bool empty() const { return bits.size() == 0; }
@@ -109,7 +110,6 @@ class BitEngine : public Conversation<std::uint8_t> {
   bool emitting_ = false;
   Error error_ = Error::none;
   Error reply_error_ = Error::none;  // error of the reply before the supplement
-  std::uint32_t rate_ = 0;           // rate that the port was told last; 0: none yet
   std::size_t size_ = 0;             // number of bits of the reply
   std::size_t awaited_ = 0;          // number of bits that the present transfer delivers
   MutableBytes storage_;

@@ -34,11 +34,6 @@ VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft, const B
   write_parameters();
 }
 
-void VirtualEncoder::raise_alarms(std::uint32_t bits) {
-  EncoderOn::raise_alarms(bits);
-  latched_ |= bits;
-}
-
 // ---- Memory
 
 std::size_t VirtualEncoder::place(WordPlace word) {
@@ -62,14 +57,14 @@ void VirtualEncoder::store(WordPlace word, std::uint16_t value) {
 
 // Returns whether the word may be written; error messages and warnings are cleared by a 0.
 bool VirtualEncoder::write(WordPlace word, std::uint16_t value) {
-  const MemoryArea* const area = find_word(word.mrs, word.address);
-  if (area == nullptr || !area->writable) return false;
   if (word.mrs == area::status && word.address <= warning_word.address) {
     const std::uint32_t cleared =
         word.address == error_word.address ? alarm::errors | alarm::error : alarm::warnings | alarm::warning;
-    if (value == 0) latched_ = (latched_ & ~cleared) | (raised() & cleared);
+    if (value == 0) latched_ &= ~cleared;
     return true;
   }
+  const MemoryArea* const area = find_word(word.mrs, word.address);
+  if (area == nullptr || !area->writable) return false;
   store(word, value);
   change_memory();
   return true;
@@ -134,7 +129,6 @@ std::uint64_t VirtualEncoder::position(Time at) const {
 // ---- Exchanges
 
 void VirtualEncoder::started(Time) {
-  latched_ = raised();
   shift_ = static_cast<std::int32_t>(std::uint32_t{load(shift_high_word)} << 16 | load(shift_word));
   area_ = 0;
   access_ = {};
@@ -180,6 +174,8 @@ void VirtualEncoder::drive(std::size_t zeros, Code code, const Reply& reply, Dri
     static_cast<void>(bits.append(0, static_cast<unsigned>(std::min<std::size_t>(low, 64))));
   }
   encode_reply(format_, code, reply, bits);
+  // A host that does not want the additional information may stop behind the position.
+  needed_clocks_ = endat::request_size(code) + bits.size() - reply.info_count * info_bits;
   hosts_take(bits.size());
   count_answer();
 }
@@ -227,6 +223,7 @@ void VirtualEncoder::respond_parameters(const Request& request, Time at, DrivenB
   drive(zeros, request.code, reply, bits);
   if (request.code == Code::reset) {
     info1_ = info2_ = 0;
+    latched_ = 0;
     is_valid_ = false;
     restart(at + behaviour_.reset_time);
   }
@@ -256,7 +253,7 @@ void VirtualEncoder::execute(const Request& request, Time at) {
       if (write(word, request.word)) access_ = {request.byte, request.word, at + behaviour_.write_time};
       break;
     case Code::error_reset_22:
-      latched_ = raised();
+      latched_ &= ~(alarm::errors | alarm::error);
       info1_ = info2_ = 0;
       area_ = 0;
       break;
@@ -277,7 +274,7 @@ void VirtualEncoder::select(std::uint8_t mrs) {
 }
 
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {
-  if (is_valid_) expect(clocks >= reply_end(), rules::few_clocks, at);
+  if (is_valid_) expect(clocks >= needed_clocks_, rules::few_clocks, at);
   const bool is_short = is_22(request_.code) && (load(initialisation_word) & recovery_mask) == short_recovery_bits;
   // The recovery time begins at the last rising edge.
   free_at_ = at - period_ / 2 + (is_short ? behaviour_.short_recovery : behaviour_.long_recovery);

@@ -47,8 +47,10 @@ class VirtualEncoder final : public author::BitDevice {
   VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour);
 
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// Raises the alarms `bits`.
-  void raise_alarms(std::uint32_t bits) override;
+  /// Raises the alarms `bits`. They end when a host clears them, or with a reset.
+  void raise_alarms(std::uint32_t bits) override { latched_ |= bits; }
+  /// Ends the alarms `bits`.
+  void lower_alarms(std::uint32_t bits) override { latched_ &= ~bits; }
   void set_condition(std::size_t, std::int64_t value, Time) override { temperature_ = value; }
 
  private:
@@ -100,7 +102,8 @@ class VirtualEncoder final : public author::BitDevice {
   Access access_{};
   // The present exchange
   Request request_{};
-  bool is_valid_ = false;  // the encoder has decoded the request
+  bool is_valid_ = false;          // the encoder has decoded the request
+  std::size_t needed_clocks_ = 0;  // clocks of the exchange up to the end of the position or the parameters
   Time latched_at_{};
   Time period_{};
   std::uint64_t position_ = 0;

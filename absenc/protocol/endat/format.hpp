@@ -61,7 +61,10 @@ struct Format {
   [[nodiscard]] constexpr Time period() const { return Time(1'000'000 / clock_khz); }
   /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const {
-    return {.rate = std::uint32_t{clock_khz} * 1000, .spi_mode = 3, .highest_rate = 16'000'000};
+    return {.rate = std::uint32_t{clock_khz} * 1000,
+            .spi_mode = 3,
+            .delay = Time(line_delay_ns),
+            .highest_rate = 16'000'000};
   }
 };
 
@@ -106,7 +109,7 @@ constexpr MemoryArea words(std::uint32_t mrs, std::uint32_t first, std::uint32_t
 }
 
 /// Areas of the memory, in the order of their MRS codes.
-inline constexpr std::array<MemoryArea, 14> memory_areas{
+inline constexpr std::array<MemoryArea, 15> memory_areas{
     words(area::maker_1, 4, 12, "parameters of the maker, part 1", false),
     words(area::maker_2, 0, 16, "parameters of the maker, part 2", false),
     words(area::maker_3, 0, 16, "parameters of the maker, part 3", false),
@@ -121,8 +124,15 @@ inline constexpr std::array<MemoryArea, 14> memory_areas{
     words(0xB7, 0, 64, "compensation values, part 4", false),
     MemoryArea{.page = area::status,
                .first = 0,
-               .count = 4,
-               .meaning = "operating status: errors, warnings, write protection, function initialisation",
+               .count = 2,
+               .meaning = "operating status: error messages, warnings",
+               .writable = false,
+               .in_dump = false,
+               .word = 2},
+    MemoryArea{.page = area::status,
+               .first = 2,
+               .count = 2,
+               .meaning = "operating status: write protection, function initialisation",
                .in_dump = false,
                .word = 2},
     words(area::maker_22, 0, 64, "parameters of the maker for EnDat 2.2", false),

@@ -182,7 +182,9 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
   found.command.reset();  // the values are of several exchanges
   found.start.reset();
   found.reading.alarms = alarms;
-  found.reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | alarm::warning;
+  // WRN is known from additional information only, unless a warning is set.
+  const bool knows_group = warnings != 0 || (found.reading.alarms_reported & alarm::warning) != 0;
+  found.reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
   if (errors != 0) found.reading.singleturn_valid_bits = 0;
   found.reading.multiturn_valid = found.reading.multiturn_valid && errors == 0;
   co_return alarms;
@@ -562,7 +564,7 @@ Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   const Selection before = co_await find_selection(dialog);
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
-  found.temperature = static_cast<double>(tenths) / 10 - 273.15;
+  found.temperature = (static_cast<double>(tenths) * 10 - 27'315) / 100;
   co_return done;
 }
 

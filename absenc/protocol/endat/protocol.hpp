@@ -37,11 +37,12 @@ struct Protocol {
   using Request = endat::Request;
   /// C++ type of the encoder's replies.
   using Reply = endat::Reply;
-  static constexpr bool replies_carry_position = true;  ///< Replies to all commands of EnDat 2.2 have the position.
   /// Greatest number of bits of a reply: an access to a parameter may take 12 ms.
   static constexpr std::size_t longest_reply_bits =
       turn_bits + clocks_in(memory_access_time, memory_rate) + 1 + parameter_bits + crc_bits;
 
+  /// Returns the pause of a host after each exchange.
+  static constexpr author::HostTimes host_times(const Format&) { return {.pause = long_recovery}; }
   /// Returns how a request is repeated: those that only read are, twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     const Code code = request.code;
@@ -59,13 +60,15 @@ struct Protocol {
         .rate = rate,
         .rest = is_22(code) && format.recovery == Recovery::short_time ? short_recovery : long_recovery};
     const std::size_t reply = 1 + reply_size(format, code);
+    const std::size_t longest_start = clocks_to_start(format.latency, rate) + delay_clocks(format.line_delay_ns, rate);
     if (has_parameters(code)) {
       encoded.clocks = turn_bits + clocks_in(memory_access_time, rate) + reply;
     } else if (has_supplement(code)) {
       encoded.clocks = turn_bits + reply;
+      encoded.late_clocks = longest_start - command_bits - turn_bits;
     } else {
-      encoded.clocks = clocks_to_start(format.latency, rate) + delay_clocks(format.line_delay_ns, rate) + reply -
-                       command_bits + (request.seeks_infos ? (2 - format.infos()) * info_bits : 0);
+      encoded.clocks =
+          longest_start + reply - command_bits + (request.seeks_infos ? (2 - format.infos()) * info_bits : 0);
     }
     return encoded;
   }
