@@ -274,4 +274,25 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
   return bench.check().is_right() && bench.device().violation_count() == 0;
 }
 
+/// Bench of the program, which `on_alarm` uses.
+template <class Bench>
+inline Bench* bench = nullptr;
+
+/// Makes a Bench for an encoder of `model` with `settings`, runs it with the commands of `plan`, and ends the program.
+template <class Bench>
+[[noreturn]] void run_program(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                              const Plan& plan) {
+  static Options options;
+  if (resolve_options(unit, model, settings, options).kind != OptionError::Kind::none) machine::end(false);
+  machine::start_clock(500ms);
+  alignas(Bench) static std::array<std::byte, sizeof(Bench)> memory;
+  bench<Bench> = new (memory.data()) Bench(options, machine::now());
+  {
+    const machine::InterruptLock lock;
+    run_line(*bench<Bench>);
+  }
+  static ServiceRunner command(unit, options);
+  machine::end(run_commands(*bench<Bench>, command, plan, machine::argument(0, 100'000)));
+}
+
 }  // namespace absenc::firmware

@@ -104,32 +104,13 @@ class Bench {
   CycleCheck check_{1us};
 };
 
-alignas(Bench) std::byte bench_memory[sizeof(Bench)];
-Bench* bench = nullptr;
-
 }  // namespace
 }  // namespace absenc::firmware
 
-namespace absenc::machine {
-void on_tick() {}
-void on_received(std::uint8_t) {}
-void on_sent() {}
-void on_alarm() { firmware::run_line(*firmware::bench); }
-}  // namespace absenc::machine
+void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware::Bench>); }
 
 int main() {
   using namespace absenc;
-  using namespace absenc::firmware;
-  static Options options;
   constexpr std::array<OptionText, 3> settings{{{"ma_khz", "5000"}, {"adaptive_timeout", "true"}, {"latency_us", "1"}}};
-  if (resolve_options(biss::unit, {}, settings, options).kind != OptionError::Kind::none) machine::end(false);
-  machine::start_clock(500ms);
-  bench = new (bench_memory) Bench(options, machine::now());
-  {
-    const machine::InterruptLock lock;
-    run_line(*bench);
-  }
-  static ServiceRunner command(biss::unit, options);
-  const std::uint32_t cycles = machine::argument(0, 100'000);
-  machine::end(run_commands(*bench, command, {.page = 0, .addresses = 64, .bytes = 64}, cycles));
+  firmware::run_program<firmware::Bench>(biss::unit, {}, settings, {.page = 0, .addresses = 64, .bytes = 64});
 }

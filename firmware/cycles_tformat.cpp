@@ -136,39 +136,19 @@ class Bench {
   CycleCheck check_{5us};
 };
 
-alignas(Bench) std::byte bench_memory[sizeof(Bench)];
-Bench* bench = nullptr;
-
 }  // namespace
 }  // namespace absenc::firmware
 
-namespace absenc::machine {
-void on_tick() {}
-void on_received(std::uint8_t) {}
-void on_sent() {}
-void on_alarm() { firmware::run_line(*firmware::bench); }
-}  // namespace absenc::machine
+void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware::Bench>); }
 
 int main() {
   using namespace absenc;
-  using namespace absenc::firmware;
-  static Options options;
-  if (resolve_options(tformat::unit, "TS5700N8500", {}, options).kind != OptionError::Kind::none) machine::end(false);
-  machine::start_clock(500ms);
-  bench = new (bench_memory) Bench(options, machine::now());
-  {
-    const machine::InterruptLock lock;
-    run_line(*bench);
-  }
-  static ServiceRunner command(tformat::unit, options);
-  const std::uint32_t cycles = machine::argument(0, 100'000);
-  machine::end(run_commands(*bench, command,
-                            {.temperature = "temperature",
-                             .alarm = tformat::alarms::over_heat,
-                             .clear = "clear-alarms",
-                             .page = 2,
-                             .addresses = 127,
-                             .bytes = 256,
-                             .takes_cycles = true},
-                            cycles));
+  firmware::run_program<firmware::Bench>(tformat::unit, "TS5700N8500", {},
+                                         {.temperature = "temperature",
+                                          .alarm = tformat::alarms::over_heat,
+                                          .clear = "clear-alarms",
+                                          .page = 2,
+                                          .addresses = 127,
+                                          .bytes = 256,
+                                          .takes_cycles = true});
 }
