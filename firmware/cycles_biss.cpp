@@ -25,7 +25,8 @@ class Bench {
  public:
   Bench(const Options& options, Time begin)
       : device_(*biss::unit.device(options, shaft_, device_memory_).bytes),
-        axis_(read_, {.period = period, .line = biss::line_settings, .carried = biss::unit.services_carry_position},
+        axis_(read_,
+              {.period = firmware::period, .line = biss::line_settings, .carried = biss::unit.services_carry_position},
               begin + period),
         drive_(drive_end_) {
     device_.power_on(begin, Device<std::uint8_t>::PowerOn::skip);
@@ -112,5 +113,7 @@ void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware:
 int main() {
   using namespace absenc;
   constexpr std::array<OptionText, 3> settings{{{"ma_khz", "5000"}, {"adaptive_timeout", "true"}, {"latency_us", "1"}}};
-  firmware::run_program<firmware::Bench>(biss::unit, {}, settings, {.page = 0, .addresses = 64, .bytes = 64});
+  firmware::run_program<firmware::Bench>(
+      biss::unit, {}, settings,
+      {.period = firmware::period, .alarm = word_warning, .page = 0, .addresses = 64, .bytes = 256});
 }

@@ -25,7 +25,7 @@ class Bench {
  public:
   Bench(const Options& options, Time begin)
       : device_(*tformat::unit.device(options, shaft_, device_memory_).bytes),
-        axis_(read_, {.period = period, .line = tformat::line_settings, .answer = 12us, .latency = latency},
+        axis_(read_, {.period = firmware::period, .line = tformat::line_settings, .answer = 12us, .latency = latency},
               begin + period),
         drive_(drive_end_, latency),
         encoder_(encoder_end_) {
@@ -144,7 +144,8 @@ void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware:
 int main() {
   using namespace absenc;
   firmware::run_program<firmware::Bench>(tformat::unit, "TS5700N8500", {},
-                                         {.temperature = "temperature",
+                                         {.period = firmware::period,
+                                          .temperature = "temperature",
                                           .alarm = tformat::alarms::over_heat,
                                           .clear = "clear-alarms",
                                           .page = 2,

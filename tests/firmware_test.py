@@ -116,7 +116,7 @@ class Cycles(unittest.TestCase):
         counted = {name: int(number) for name, number in re.findall(r"^([a-z_]+) (\d+)$", output, re.MULTILINE)}
         self.assertEqual(status, 0, output)
         self.assertGreaterEqual(sum(counted[kind] for kind in ("fresh", "invalid", "missing", "repeated")), CYCLES)
-        self.assertEqual((counted["wrong"], counted["far"], counted["rules"]), (0, 0, 0), output)
+        self.assertEqual((counted["wrong"], counted["far"], counted["rules"], counted["left_out"]), (0, 0, 0, 0), output)
         self.assertGreater(counted["faults"], CYCLES // 200, output)
         # A damaged reply costs one cycle, or two if the line must be silent before the next request.
         self.assertLessEqual(counted["missing"], 2 * counted["faults"], output)
@@ -143,6 +143,7 @@ class Cycles(unittest.TestCase):
                 counted, output = self.check("biss", cpu)
                 self.assertEqual(counted["repeated"], 0, output)
                 self.assertLessEqual(counted["longest_stale"], 4, output)
+                self.assertGreater(counted["alarmed"], 0, output)
 
 
 class Encoder(unittest.TestCase):
