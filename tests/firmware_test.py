@@ -220,7 +220,7 @@ class FloatingPoint(unittest.TestCase):
 
     def test_readers_link_none(self):
         readers = re.findall(r"(reader-\w+-(?:m0plus|m4f))\.elf", " ".join(sorted(os.listdir(FOLDER))))
-        for part in ("first_reading", "unwrapper", "velocity"):
+        for part in ("extrapolation", "first_reading", "unwrapper", "velocity"):
             self.assertIn(f"reader-host_{part}-m0plus", readers)
             self.assertIn(f"reader-host_{part}-m4f", readers)
         for reader in readers:
@@ -287,6 +287,19 @@ class CallGraph(unittest.TestCase):
             push {r4, lr}
             blx r3
             pop {r4, pc}
+        .cpu cortex-m4
+        function jumps_by_table
+            push {r4, lr}
+            adr r2, 3f
+            ldr pc, [r2, r3, lsl #2]
+            .align 2
+        3:  .word 4f + 1
+            .word 5f + 1
+        4:  pop {r4, pc}
+        5:  sub sp, #48
+            bl leaf
+            add sp, #48
+            pop {r4, pc}
         """
 
     def setUp(self):
@@ -306,6 +319,7 @@ class CallGraph(unittest.TestCase):
         self.assertEqual(self.depth("tail"), 32)
         self.assertEqual(self.depth("returns_by_register"), 8 + 8 + 32)
         self.assertEqual(self.depth("large"), 8 + 1000 + 32)
+        self.assertEqual(self.depth("jumps_by_table"), 8 + 48 + 32)
 
     def test_recursion_is_an_error(self):
         with self.assertRaisesRegex(call_graph.Recursion, "recursive calls itself"):
@@ -320,7 +334,7 @@ class CallGraph(unittest.TestCase):
     def test_computed_stack_covers_measured_stack(self):
         with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
             plugin = figures.build_plugin(folder)
-            for reader in ("tformat", "biss", "esl", "raa38_can", "host_unwrapper"):
+            for reader in ("tformat", "biss", "esl", "raa38_can", "host_unwrapper", "tformat_cyclic"):
                 for cpu in figures.MACHINES:
                     with self.subTest(reader=reader, cpu=cpu):
                         program = os.path.join(FOLDER, f"reader-{reader}-{cpu}.elf")
