@@ -83,16 +83,16 @@ class CycleCheck {
     longest_stale_ = std::max(longest_stale_, cycle.stale);
     if (cycle.kind != host::Cycle::Kind::fresh) return;
     const Reading& reading = cycle.reading;
-    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached.
-    if (!first_.confirms(reading)) {
+    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached: by the
+    // speed limit, and by the speed of the last two readings.
+    if (!first_.confirms(reading) || !continues(reading)) {
       ++implausible_;
       return;
     }
     if (reading.alarms != 0) ++alarmed_;
     if (!is_near(counts_of(reading), reading, reading.latched, 1, 1)) ++wrong_;
-    // between readings that are further apart than this, the check does not extrapolate
-    constexpr Time longest_gap = 500us;
     if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
+    span_ = reading.latched - latched_;
     latched_ = reading.latched;
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
@@ -114,6 +114,25 @@ class CycleCheck {
   }
 
  private:
+  // Between readings that are further apart than this, the drive does not extrapolate.
+  static constexpr Time longest_gap = 500us;
+
+  // Returns whether the position is where the last two readings lead, with a tolerance for their errors: a count each,
+  // and the motion within the jitter of their times. Both grow with the extrapolated time.
+  [[nodiscard]] bool continues(const Reading& reading) const {
+    const Time gap = reading.latched - latched_;
+    if (!extrapolation_.valid() || gap > longest_gap) return true;
+    const unsigned bits = extrapolation_.bits();
+    if (bits != reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0)) return true;
+    const auto apart = [bits](std::uint64_t from, std::uint64_t to) {
+      const std::int64_t distance = with_sign(to - from, bits);
+      return distance < 0 ? -distance : distance;
+    };
+    constexpr std::int64_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
+    const std::int64_t error = 1 + apart(extrapolation_.at(latched_), extrapolation_.at(latched_ + jitter_));
+    const std::int64_t allowed = by_acceleration + 2 * error + 2 * error * (gap / span_);
+    return apart(extrapolation_.at(reading.latched), counts_of(reading)) <= allowed;
+  }
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
@@ -134,10 +153,11 @@ class CycleCheck {
   Time jitter_;
   host::Extrapolation extrapolation_{};
   Time latched_{};  // time at which the last new and plausible reading was latched
+  Time span_{};     // time between the latches of the last two such readings
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;
-  // number of new readings whose position the shaft cannot have reached since the reading before
+  // number of new readings whose position the shaft cannot have reached since the readings before
   std::uint32_t implausible_ = 0;
   std::uint32_t alarmed_ = 0;  // number of good positions with an alarm
   std::uint32_t wrong_ = 0;
