@@ -103,7 +103,7 @@ add_custom_target(firmware-readers)
 file(GLOB reader_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/firmware/readers/*.cpp")
 foreach(source IN LISTS reader_sources)
   cmake_path(GET source STEM reader)
-  string(REGEX REPLACE "_(known|carrier)$" "" unit "${reader}")
+  string(REGEX REPLACE "_(known|carrier|cyclic)$" "" unit "${reader}")
   string(REPLACE _ - unit "${unit}")
   foreach(cpu IN ITEMS m0plus m4f)
     firmware_program(reader-${reader}-${cpu} mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-${cpu}

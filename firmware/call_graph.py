@@ -72,6 +72,16 @@ class Function:
             break
         raise Unknown(f"{self.name}: the stack changes by an unknown {register}")
 
+    def jump_table(self, address, index_of):
+        """Returns the targets in the table of addresses behind the jump at `address`."""
+        targets = []
+        at = (address + 7) & ~3  # the jump has 4 bytes, and words are aligned
+        while (target := self.words.get(at, 0) & ~1) in index_of:
+            targets.append(target)
+            at += 4
+        if not targets:
+            raise Unknown(f"{self.name}: a jump without a table behind it")
+        return targets
 
     def holds_return_address(self, index):
         """Returns whether the bx at `index` jumps to the return address: by lr, or a register popped before."""
@@ -173,6 +183,9 @@ class Graph:
                     goes_on = name == "blx"
                     targets = self.indirect_targets(function, address, index_of, waiting, after)
                 elif name == "ldr" and operands == "pc, [sp], #4":
+                    goes_on = False
+                elif name == "ldr" and re.fullmatch(r"pc, \[\w+, \w+, lsl #2\]", operands):
+                    waiting += [(index_of[target], after) for target in function.jump_table(address, index_of)]
                     goes_on = False
                 elif name in ("mov", "ldr", "add") and operands.startswith("pc,"):
                     raise Unknown(f"{function.name}: a jump by {name} {operands}")

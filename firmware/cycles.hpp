@@ -83,15 +83,16 @@ class CycleCheck {
     longest_stale_ = std::max(longest_stale_, cycle.stale);
     if (cycle.kind != host::Cycle::Kind::fresh) return;
     const Reading& reading = cycle.reading;
-    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached.
-    if (!first_.confirms(reading)) {
+    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached: by the
+    // speed limit, and by the speed of the last two readings.
+    if (!first_.confirms(reading) || !continues(reading)) {
       ++implausible_;
       return;
     }
+    if (reading.alarms != 0) ++alarmed_;
     if (!is_near(counts_of(reading), reading, reading.latched, 1, 1)) ++wrong_;
-    // between readings that are further apart than this, the check does not extrapolate
-    constexpr Time longest_gap = 500us;
     if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
+    span_ = reading.latched - latched_;
     latched_ = reading.latched;
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
@@ -107,11 +108,31 @@ class CycleCheck {
     for (std::size_t i = 0; i < names.size(); ++i) print_count(names[i], counts_[i]);
     print_count("longest_stale", longest_stale_);
     print_count("implausible", implausible_);
+    print_count("alarmed", alarmed_);
     print_count("wrong", wrong_);
     print_count("far", far_);
   }
 
  private:
+  // Between readings that are further apart than this, the drive does not extrapolate.
+  static constexpr Time longest_gap = 500us;
+
+  // Returns whether the position is where the last two readings lead, with a tolerance for their errors: a count each,
+  // and the motion within the jitter of their times. Both grow with the extrapolated time.
+  [[nodiscard]] bool continues(const Reading& reading) const {
+    const Time gap = reading.latched - latched_;
+    if (!extrapolation_.valid() || gap > longest_gap) return true;
+    const unsigned bits = extrapolation_.bits();
+    if (bits != reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0)) return true;
+    const auto apart = [bits](std::uint64_t from, std::uint64_t to) {
+      const std::int64_t distance = with_sign(to - from, bits);
+      return distance < 0 ? -distance : distance;
+    };
+    constexpr std::int64_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
+    const std::int64_t error = 1 + apart(extrapolation_.at(latched_), extrapolation_.at(latched_ + jitter_));
+    const std::int64_t allowed = by_acceleration + 2 * error + 2 * error * (gap / span_);
+    return apart(extrapolation_.at(reading.latched), counts_of(reading)) <= allowed;
+  }
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
@@ -132,11 +153,13 @@ class CycleCheck {
   Time jitter_;
   host::Extrapolation extrapolation_{};
   Time latched_{};  // time at which the last new and plausible reading was latched
+  Time span_{};     // time between the latches of the last two such readings
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;
-  // number of new readings whose position the shaft cannot have reached since the reading before
+  // number of new readings whose position the shaft cannot have reached since the readings before
   std::uint32_t implausible_ = 0;
+  std::uint32_t alarmed_ = 0;  // number of good positions with an alarm
   std::uint32_t wrong_ = 0;
   // number of extrapolated positions that are farther from the true position of the shaft than allowed
   std::uint32_t far_ = 0;
@@ -197,9 +220,10 @@ class ServiceRunner {
 
 /// The values in which the programs cycles_tformat and cycles_biss differ.
 struct Plan {
+  Time period{};                   ///< time from one cycle to the next
   std::string_view temperature{};  ///< command that is run every second; "": none
-  std::uint32_t alarm = 0;         ///< alarm that the encoder raises in each rest of the shaft; 0: none
-  std::string_view clear{};        ///< command that clears the alarm; "": no command is run
+  std::uint32_t alarm = 0;         ///< alarm that the encoder raises once in each motion of the shaft
+  std::string_view clear{};        ///< command that clears the alarm; "": the encoder itself ends it after 100 ms
   std::int64_t page = 0;           ///< page of the encoder's memory that is written and read
   std::int64_t addresses = 0;      ///< number of addresses on each page of the memory
   std::int64_t bytes = 0;          ///< number of bytes of the encoder's memory that are written and read
@@ -217,7 +241,9 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
   std::uint32_t temperatures = 0;
   std::uint32_t cleared = 0;
   Time second = 1s;
-  Time alarm_at = AcceleratingShaft::begin_of_rest + 100ms;
+  // An alarm that a command clears is raised while the shaft rests, because the encoder refuses the command otherwise.
+  Time alarm_at = (plan.clear.empty() ? Time{} : AcceleratingShaft::begin_of_rest) + 100ms;
+  Time alarm_ends = never;
   const auto is_running = [&] {
     const machine::InterruptLock lock;
     return bench.check().all() < cycles;
@@ -232,14 +258,21 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
       second += 1s;
       if (run(plan.temperature, {})) ++temperatures;
     }
-    if (plan.alarm == 0 || machine::now() < alarm_at) return;
+    if (machine::now() >= alarm_ends) {
+      alarm_ends = never;
+      const machine::InterruptLock lock;
+      bench.device().lower_alarms(plan.alarm);
+    }
+    if (machine::now() < alarm_at) return;
     alarm_at += AcceleratingShaft::period;
     {
       const machine::InterruptLock lock;
       bench.device().raise_alarms(plan.alarm);
     }
-    if (!plan.clear.empty()) {
-      if (run(plan.clear, {})) ++cleared;
+    if (plan.clear.empty()) {
+      alarm_ends = machine::now() + 100ms;
+    } else if (run(plan.clear, {})) {
+      ++cleared;
     }
   };
   for (std::int64_t i = 0; is_running(); ++i) {
@@ -251,7 +284,7 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     const std::int64_t address = i % plan.addresses;
     const std::int64_t page = plan.page + i / plan.addresses;
     const std::int64_t value = (i * 37 + 11) & 0xFF;
-    const std::array<std::int64_t, 4> write{address, value, page, 0};
+    const std::array<std::int64_t, 4> write{address, value, page, 1};  // BiSS writes most banks only if forced: 1
     const std::array<std::int64_t, 3> read{address, page, 1};
     const std::size_t write_count = find_command(bench.unit(), "memory-write")->arguments.size();
     // If a damaged reply ends a command, the command is run again: writing the same byte twice does no harm.
@@ -263,6 +296,8 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     }
   }
   const machine::InterruptLock lock;
+  // The first cycle begins after one period, and each cycle has its result, which may come in the next one.
+  const std::int64_t left_out = machine::now() / plan.period - bench.check().all();
   bench.check().print_counts();
   print_count("bytes", written);
   print_count("temperatures", temperatures);
@@ -271,7 +306,29 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
   print_count("faults", bench.faults());
   print_count("rules", bench.device().violation_count());
   print_count("stack", machine::stack_used());
-  return bench.check().is_right() && bench.device().violation_count() == 0;
+  print_count("left_out", static_cast<std::uint64_t>(std::max<std::int64_t>(left_out - 2, 0)));
+  return bench.check().is_right() && bench.device().violation_count() == 0 && left_out <= 2;
+}
+
+/// Bench of the program, which `on_alarm` uses.
+template <class Bench>
+inline Bench* bench = nullptr;
+
+/// Makes a Bench for an encoder of `model` with `settings`, runs it with the commands of `plan`, and ends the program.
+template <class Bench>
+[[noreturn]] void run_program(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                              const Plan& plan) {
+  static Options options;
+  if (resolve_options(unit, model, settings, options).kind != OptionError::Kind::none) machine::end(false);
+  machine::start_clock(500ms);
+  alignas(Bench) static std::array<std::byte, sizeof(Bench)> memory;
+  bench<Bench> = new (memory.data()) Bench(options, machine::now());
+  {
+    const machine::InterruptLock lock;
+    run_line(*bench<Bench>);
+  }
+  static ServiceRunner command(unit, options);
+  machine::end(run_commands(*bench<Bench>, command, plan, machine::argument(0, 100'000)));
 }
 
 }  // namespace absenc::firmware

@@ -97,4 +97,5 @@ def main():
         file.write("std::span<const ReferenceVector> reference_vectors() { return vectors; }\n}\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -67,7 +67,7 @@ TEST(DriveGuide, RegisterAccessRidesInCycles) {
   ASSERT_NE(service, nullptr);
   int cycles = 0;
   for (; !service->is_over() && cycles < 1000; ++cycles) {
-    run_until(time_now + 50us);
+    run_until(time_now + Axis::period);
     ASSERT_EQ(axis.last.kind, host::Cycle::Kind::fresh) << "the access cost cycle " << cycles;
     const std::int64_t truth = motion.at(axis.last.reading.latched).position >> 13 & 0x7FFFF;
     EXPECT_LE(std::abs(wrapped_difference(axis.last.reading.singleturn, static_cast<std::uint64_t>(truth), 19)), 60);

@@ -34,6 +34,7 @@ REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
 # Words that show that a declaration is a table; numbers in tables are not mutated.
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
@@ -170,7 +171,8 @@ class Finder:
         # comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
-        description = "\n".join([rule, after, str(first - begin), *context])
+        code_after = " ".join(COMMENT.sub("", after).split())
+        description = "\n".join([rule, code_after, str(first - begin), *context])
         repetition = self._seen[description] = self._seen.get(description, 0) + 1
         digest = hashlib.sha256(f"{description}\n{repetition}".encode()).hexdigest()[:8]
         name = f"{self.file}:{rule}:{digest}"

@@ -64,7 +64,7 @@ namespace absenc::client {
 namespace {
 
 const std::string slow = "?max_rpm=100";
-constexpr int warm_up = 10;
+constexpr int warm_up = 1;
 constexpr int last = 1000;
 
 void expect_no_allocation_of_reads(const std::string& address) {

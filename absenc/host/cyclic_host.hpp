@@ -54,7 +54,8 @@ class Service {
 /// The times that a CyclicHost keeps, and its line.
 struct CyclePlan {
   Time period{};        ///< time from one cycle to the next
-  LineSettings line{};  ///< settings of the line, from which the durations of requests and replies follow
+  /// settings of the line, from which the durations of requests and replies follow; a conversation may set another rate
+  LineSettings line{};
   /// longest time from a request to its reply, if shorter than the protocol's limit; 0: the protocol's limit
   Time answer{};
   Time rest{};     ///< shortest silence between a reply and the next request
@@ -139,6 +140,10 @@ class CyclicHost final : public Machine<Item> {
   void take_service_step(const Step<Item>& step, Time now);
   bool begin_service(Step<Item>& step, Time now);
   void end_service(State state);
+  // Stores the bit rate that a conversation sets, because the durations of transfers follow from it.
+  void set_rate(const Step<Item>& step) {
+    if (step.rate != 0) plan_.line.rate = step.rate;
+  }
   void begin_transfer(Step<Item>& step);
   void limit(Step<Item>& step, Time now) const;
   // Returns whether the position of the next cycle may come with the reply to the service's request.
@@ -263,6 +268,7 @@ bool CyclicHost<Item, Read>::continue_position(Step<Item>& step, Time now) {
       conclude_position(now);
       return false;
     case Kind::configure:
+      set_rate(step);
       return true;
     case Kind::wait:
       limit(step, now);
@@ -368,11 +374,12 @@ bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   step = step_;
   wants_ = takes_ = false;
   if (step.kind == Kind::configure) {
+    set_rate(step);
     wake_ = now;
     return true;
   }
   step.at = start;
-  is_row_ = step.holds_line;
+  is_row_ = step.holds_line || step.goes_on;
   user_ = User::service;
   begin_transfer(step);
   return true;
@@ -409,7 +416,7 @@ Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
   LineSettings line = plan_.line.with_some_rate();
   if (step.rate != 0) line.rate = step.rate;
   if (step.kind == Kind::pulse) return step.width;
-  if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
+  if (step.bits != 0) return line.bits(step.bits + line.idle_clocks) + (step.goes_on ? step.width : Time{});
   if constexpr (is_can) {
     // number of bits of an extended CAN frame with 8 data bytes, with stuff bits
     constexpr unsigned longest_frame = 160;

@@ -22,6 +22,7 @@ void set_clock(bool high);  // you write this: sets the level of the clock line 
 struct Axis {
   // The encoder has 19 bits and a clock of 5 MHz. It needs 1 us for a position; its timeout adapts to the clock.
   static constexpr biss::Format format{.ma_khz = 5000, .timeout = biss::Timeout::adaptive(), .latency = 1us};
+  static constexpr Time period = 31'250ns;  // period of the current loop
 
   struct Read {
     Conversation<std::uint8_t>& operator()() { return *new (memory) biss::ReadPosition(format); }
@@ -29,7 +30,7 @@ struct Axis {
   };
   Read read;
   host::CyclicHost<std::uint8_t, Read&> cycles{
-      read, {.period = 50us, .line = biss::line_settings, .carried = biss::unit.services_carry_position}, 50us};
+      read, {.period = period, .line = biss::line_settings, .carried = biss::unit.services_carry_position}, period};
   host::Carrier<std::uint8_t, Axis> carrier{*this};
   std::array<std::uint8_t, 32> samples{};
   std::size_t bytes = 0;

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "absenc/host/cyclic_host.hpp"
 #include "absenc/sim/place.hpp"
+#include "tests/kit/drives.hpp"
 #include "tests/kit/kit.hpp"
-#include "tests/kit/world.hpp"
 
 namespace absenc::kit {
 namespace {
@@ -37,30 +36,18 @@ class Rides {
         configuration_(configuration),
         findings_(findings),
         read_(*find_command(unit, Verb::read)),
-        plan_{.line = line_settings(unit, configuration.options).with_some_rate(),
-              .rest = unit.rest != nullptr ? unit.rest(configuration.options) : Time{},
-              .carried = unit.services_carry_position} {}
+        plan_(plan_for(unit, configuration)) {}
 
-  void run() {
-    World<Item> world(unit_, configuration_.options, 1);
-    if (!world.made()) return;
-    world.move(place);
-    world.run(read_, {});
-    const Time begin = world.line().now();
-    const ConversationResult read = world.run(read_, {});
-    // A drive needs a `read` of one request; configurations whose `read` sends several are left out.
-    if (!read.good() || (read.request_count > 1 && !read.sent.empty())) return;
-    position_time_ = world.line().now() - begin;
-    // While an alarm is raised, `read` may send an additional request.
-    world.device().raise_alarms(~std::uint32_t{0});
-    const Time again = world.line().now();
-    world.run(read_, {});
-    position_time_ = std::max(position_time_, world.line().now() - again);
-    ++runs;
+  /// Runs cycles with each command. Returns false if the configuration is not one of a drive.
+  bool run() {
+    const std::optional<Time> longest = time_of_position<Item>(unit_, configuration_, read_);
+    if (!longest) return false;
+    position_time_ = *longest;
     ride_alone();
     for (const Command& command : unit_.commands) {
       if (is_service(command)) run_service(command);
     }
+    return true;
   }
 
  private:
@@ -83,7 +70,7 @@ class Rides {
     auto* const made = unit_.host(configuration_.options, command, arguments, storage).template of<Item>();
     if (made == nullptr || made->streams()) return;
     World<Item> alone(unit_, configuration_.options, 1);
-    alone.move(place);
+    alone.move(standing_place);
     alone.run(read_, {});
     const ConversationResult wanted = alone.run(command, arguments);
     if (!wanted.made || !wanted.ended || alone.device().violation_count() != 0) return;
@@ -167,7 +154,7 @@ class Rides {
   // Runs cycles until five have ended after the service; without a service, five cycles. Ends after 200 s in any
   // case.
   Ride ride(World<Item>& world, host::Service<Item>* service, bool changes) {
-    world.move(place);
+    world.move(standing_place);
     world.run(read_, {});
     std::vector<std::byte> storage(unit_.host_storage);
     const auto read = [&]() -> Conversation<Item>& {
@@ -206,9 +193,6 @@ class Rides {
     return result;
   }
 
-  // position of the shaft: 4660 turns and about a third, in units of 2^-32 turn
-  static constexpr std::int64_t place = 0x1234'5678'9ABC;
-
   const Unit& unit_;
   const Configuration& configuration_;
   Findings& findings_;
@@ -218,49 +202,26 @@ class Rides {
   std::string rule_;
 
  public:
-  unsigned runs = 0;
   unsigned services = 0;
   unsigned took_cycles = 0;
 };
-
-/// Returns the configurations of the unit's test vectors.
-std::vector<Configuration> configurations_of_vectors(const Unit& unit) {
-  std::vector<Configuration> all;
-  for (const Vector& vector : unit.vectors) {
-    const bool known = std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.text == vector.options; });
-    const std::optional<Options> options = known ? std::nullopt : options_of(unit, vector.options);
-    if (options) all.push_back({std::string(vector.options), *options});
-  }
-  return all;
-}
 
 }  // namespace
 
 Findings check_cycles(const Unit& unit) {
   Findings findings;
-  unsigned runs = 0;
   unsigned services = 0;
   unsigned took = 0;
-  // The configurations of the models are run first. Those of the test vectors are run only if `read` sends several
-  // requests with every model.
-  for (const bool of_models : {true, false}) {
-    for (const Configuration& configuration : of_models ? configurations(unit) : configurations_of_vectors(unit)) {
-      const bool streams = unit.streams != nullptr && unit.streams(configuration.options);
-      if ((of_models && !configuration.is_model) || streams) continue;
-      const auto run = [&](auto rides) {
-        rides.run();
-        runs += rides.runs;
-        services += rides.services;
-        took += rides.took_cycles;
-      };
-      if (unit.link == LinkKind::can) {
-        run(Rides<CanFrame>(unit, configuration, findings));
-      } else {
-        run(Rides<std::uint8_t>(unit, configuration, findings));
-      }
-    }
-    if (runs != 0) break;
-  }
+  for_each_drive(unit, [&](const Configuration& configuration) {
+    const auto run = [&](auto rides) {
+      const bool is_run = rides.run();
+      services += rides.services;
+      took += rides.took_cycles;
+      return is_run;
+    };
+    return unit.link == LinkKind::can ? run(Rides<CanFrame>(unit, configuration, findings))
+                                      : run(Rides<std::uint8_t>(unit, configuration, findings));
+  });
   findings.note(std::to_string(services) + " services, which took " + std::to_string(took) + " cycles");
   return findings;
 }

@@ -54,6 +54,9 @@ namespace absenc::kit {
 /// Runs commands as services beside the cyclic position requests of a drive, and checks the results of both.
 [[nodiscard]] Findings check_cycles(const Unit& unit);
 
+/// Runs cycles while the shaft accelerates and replies are damaged or late, and compares each position with the shaft.
+[[nodiscard]] Findings check_turning(const Unit& unit);
+
 /// Settings of `check_exchanges`, which runs hosts against virtual encoders on a faulty line.
 struct ExchangeTest {
   std::uint64_t count = 100'000;

@@ -77,6 +77,21 @@ struct Judge {
 
 }  // namespace
 
+void DamagedReplies::judge(const std::string& command, Findings& findings) const {
+  if (!undetected) return;
+  const auto judge_kind = [&](std::uint64_t accepted, const DamageCount& share, const char* what) {
+    const std::uint64_t allowed = share.allowed(count);
+    const auto text = [&] {
+      return command + ": of " + std::to_string(count) + " damaged replies " + std::to_string(accepted) +
+             " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) + " pass";
+    };
+    findings.require(accepted <= allowed, text);
+    if (accepted > 0) findings.note(text());
+  };
+  judge_kind(wrong_positions, undetected->position, "position");
+  judge_kind(wrong_values, undetected->others, "value");
+}
+
 UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options, const OwnedFrame& request,
                                            const OwnedFrame& reply, const sim::FaultRates& rates, unsigned samples) {
   std::uint64_t damaged = 0;

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how often a unit's frame check accepts damaged replies.
+// Measures how often a unit's frame check accepts damaged replies, and judges whether a host accepted more.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "absenc/sim/faulty_node.hpp"
+#include "tests/kit/findings.hpp"
 #include "tests/kit/frames.hpp"
 
 namespace absenc::kit {
@@ -37,6 +40,18 @@ struct UndetectedDamage {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;
   }
+};
+
+/// Counts the damaged replies to one command, and the wrong results that a host made of them.
+struct DamagedReplies {
+  std::optional<UndetectedDamage> undetected{};  ///< what the frame check lets pass; empty if not measured yet
+  std::uint64_t count = 0;                       ///< number of damaged replies
+  std::uint64_t wrong_positions = 0;             ///< number of wrong results with a wrong position
+  std::uint64_t wrong_values = 0;  ///< number of wrong results with a right position and another wrong value
+
+  /// Adds a finding if there are more wrong results than the frame check lets pass, and a note if there is any.
+  /// `command` names the command.
+  void judge(const std::string& command, Findings& findings) const;
 };
 
 /// Damages copies of `reply`, `samples` times in all, and counts those that decode to wrong values.

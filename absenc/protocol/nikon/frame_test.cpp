@@ -73,7 +73,9 @@ TEST(NikonFrame, RequestsDecodeToWhatWasEncoded) {
 
 TEST(NikonFrame, RefusesBadRequests) {
   const auto error = [](const Wire& bytes) { return decode_request({}, bytes).error(); };
+  EXPECT_EQ(error({}), Error::wrong_length);
   EXPECT_EQ(error({0x02}), Error::wrong_length);
+  EXPECT_EQ(error({0x04, 0x00, 0x00}), Error::wrong_length) << "the length is checked before the sync code";
   EXPECT_EQ(error({0x02, 0x00, 0x5A}), Error::wrong_length);
   EXPECT_EQ(error({0x02, 0x00, 0x5A, 0x02}), Error::wrong_length);
   EXPECT_EQ(error({0x04, 0x00}), Error::bad_framing);

@@ -42,7 +42,7 @@ class StatusFollower final : public Follower {
     const Result<Request> asked = decode_request(format_, request);
     if (!asked) return false;
     const Result<Reply> answered = decode_reply(format_, *asked, reply);
-    if (!answered || answered->count != 1) return false;
+    if (!answered) return false;
     const Reading reading = to_reading(format_, asked->code, *answered);
     return reading.singleturn_bits + reading.multiturn_bits != 0 && reading.alarms_reported == 0;
   }
