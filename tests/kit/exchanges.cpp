@@ -210,7 +210,8 @@ class Campaign {
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
-    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
+    // A damaged request may be another valid one, which has changed the encoder.
+    if (rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
     // If a reply has no check, a host accepts any bytes as the reply, also those of the previous reply.
     const bool unchecked = is_unchecked(query);
     findings_.require(result.damaged != 0 || (unchecked && !faultless_),
@@ -219,6 +220,7 @@ class Campaign {
     ++tally_.wrong;
     DamagedReplies& damage = tally_.commands[counter_key(query)].damage;
     ++(wrong.position ? damage.wrong_positions : damage.wrong_values);
+    if (damage.example.empty()) damage.example = wrong.text;
   }
 
   // Returns whether the fields `seen` are reported on an undamaged line, too; if so, discards all recorded results.
@@ -298,10 +300,10 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Returns the key of the counters of a command: its name, and its options unless these are a model's. Other options
+  // Returns the key of the counters of a command: its name and its options, which
   // may select another frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
-    return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
+    return std::string(query.command->name) + " " + configuration_.text;
   }
 
   // Counts damaged replies. For each `counter_key`, measures once how many damaged replies the check accepts.

@@ -15,7 +15,7 @@ struct Exchange {
   OwnedFrame reply{};
 };
 
-/// Returns at most four exchanges of the command on a line without faults, with the shaft at `position`.
+/// Returns the last exchanges of the command, at most four, on a line without faults, with the shaft at `position`.
 template <class Item>
 [[nodiscard]] std::vector<Exchange> exchanges_without_faults(const Unit& unit, const Options& options,
                                                              std::int64_t position, const Command& command,
@@ -58,7 +58,7 @@ template <class Item>
   });
   (void)world.run(command, arguments);
   std::erase_if(exchanges, [](const Exchange& one) { return one.reply.empty(); });
-  if (exchanges.size() > 4) exchanges.resize(4);
+  if (exchanges.size() > 4) exchanges.erase(exchanges.begin(), exchanges.end() - 4);
   return exchanges;
 }
 

@@ -83,7 +83,8 @@ void DamagedReplies::judge(const std::string& command, Findings& findings) const
     const std::uint64_t allowed = share.allowed(count);
     const auto text = [&] {
       return command + ": of " + std::to_string(count) + " damaged replies " + std::to_string(accepted) +
-             " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) + " pass";
+             " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) +
+             " pass; the first: " + example;
     };
     findings.require(accepted <= allowed, text);
     if (accepted > 0) findings.note(text());

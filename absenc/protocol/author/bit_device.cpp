@@ -20,7 +20,7 @@ void BitDevice::feed(const ByteEvent& event) {
     if (selected_) selected(event.at, event.width);
   } else if (event.kind == Kind::received && selected_) {
     received(event);
-  } else if (event.kind == Kind::sent && std::exchange(selected_, false)) {
+  } else if (event.kind == Kind::sent && event.bits > 0 && std::exchange(selected_, false)) {
     clocked(event.at, event.bits);
   }
 }
@@ -41,6 +41,8 @@ void BitDevice::received(const ByteEvent& event) {
   driven_from_ = event.clocks_before + event.bits;
   respond(request.view(), event.at, bits_);
   if (taken_ == 0) taken_ = bits_.size();
+  // Nobody drives the line behind the last bit, so it is high.
+  while (bits_.size() % 8 != 0) static_cast<void>(bits_.append(1, 1));
   pending_ = responded_ = true;
 }
 

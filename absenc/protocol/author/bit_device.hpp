@@ -19,8 +19,8 @@ struct DirectionRules {
   std::string_view supplement;
 };
 
-/// A virtual encoder on a bidirectional clocked link; a subclass provides the bits. A bit that the host does not drive is
-/// 1 for it.
+/// A virtual encoder on a bidirectional clocked link; a subclass provides the bits. A bit that the host does not drive
+/// is 1 for it.
 class BitDevice : public EncoderOn<std::uint8_t> {
  public:
   /// Handles an event that the port reports.

@@ -31,7 +31,7 @@ void BitEngine::finish(Error error, Time hold) {
 
 ByteStep BitEngine::next(Time now) {
   // A lambda, because the compiler would first fill a plain variable with zeros.
-  ByteStep step = [this]() -> ByteStep { return {.expect = (awaited_ + 7) / 8, .at = never}; }();
+  ByteStep step = []() -> ByteStep { return {.at = never}; }();
   // The traffic before this conversation is unknown, so pauses are measured from now.
   if (!started_) received_at_ = now;
   started_ = true;
@@ -46,7 +46,9 @@ ByteStep BitEngine::next(Time now) {
   } else if (state_ == State::ending || state_ == State::over) {
     state_ = State::over;
     step.kind = ByteStep::Kind::done;
-  } else if (state_ != State::clocking && state_ != State::added) {
+  } else if (state_ == State::clocking || state_ == State::added) {
+    step.expect = (awaited_ + 7) / 8;
+  } else {
     begin_transfer(step, now);
   }
   return step;

@@ -138,6 +138,7 @@ void VirtualEncoder::started(Time) {
 void VirtualEncoder::selected(Time at, Time period) {
   period_ = period == Time{} ? format_.period() : period;
   latched_at_ = at;
+  needed_clocks_ = 0;
   const std::uint32_t fastest = format_.version == Version::v21 ? fastest_21 : fastest_22;
   expect(period_ >= Time(1'000'000'000 / fastest), rules::fastest, at);
   expect(period_ <= Time(1'000'000'000 / slowest), rules::slowest, at);

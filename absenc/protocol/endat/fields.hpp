@@ -25,16 +25,16 @@ inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"battery", "the battery was empty: the turns are lost",
      "replace the battery, return to the origin, then `absenc clear-alarms`"},
     {},
-    {"frequency", "the shaft turned faster than the encoder can measure",
-     "turn more slowly, then `absenc clear-alarms`", true},
-    {"temperature", "the encoder is or was too hot", "let it cool, then `absenc clear-alarms`", true},
+    {"frequency", "the shaft turned faster than the encoder can measure", "turn more slowly, then clear the alarms",
+     true},
+    {"temperature", "the encoder is or was too hot", "let it cool, then clear the alarms", true},
     {"light_reserve", "the light source is near its limit", "clean or replace the encoder soon", true},
     {"battery_charge", "the battery's charge is low",
-     "replace the battery with the encoder switched on, then `absenc clear-alarms`", true},
+     "replace the battery with the encoder switched on, then clear the alarms", true},
     {"reference_point", "the reference point has not been passed", "pass the reference mark", true},
     {},
-    {"error", "F1 or F2 says that the position is wrong", "`absenc run ... status` names the cause"},
-    {"warning", "WRN says that a warning is set", "`absenc run ... status` names the cause", true},
+    {"error", "F1 or F2 says that the position is wrong", "`absenc run ... status`, then `absenc clear-alarms`"},
+    {"warning", "WRN says that a warning is set", "`absenc run ... status` names it", true},
 }};
 
 /// Values of the fields of a frame, or of a procedure's result.
@@ -182,6 +182,7 @@ constexpr void add_position(Values& all, const Format& given, const Reply& reply
   } else if (request.code == Code::test || request.code == Code::communicate) {
     all.instruction = reply.word;
   }
+  if (reply.alarms_read) all.alarms = *reply.alarms_read;
   if (const Info* const info = reply.info(1)) {
     all.warning = info->warning;
     all.referenced = info->referenced;

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bit_view.hpp"
@@ -104,6 +105,8 @@ struct Reply {
   std::uint16_t word = 0;       ///< Content of the word, or the repeated 16 bits.
   std::uint16_t start = 0;      ///< Clocks of the exchange before the start bit.
   std::array<Info, 2> infos{};  ///< Additional informations, in the order of the line: 2 before 1.
+  /// Not part of the reply: alarms that the host read behind a position with an error.
+  std::optional<std::uint16_t> alarms_read{};
 
   /// Returns the additional information 1 or 2; null: it was not sent.
   [[nodiscard]] constexpr const Info* info(unsigned number) const {
@@ -261,12 +264,17 @@ constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& 
 
 namespace detail {
 // Reads the additional informations from index `first` on. The first `expected` of them must be there and valid.
-constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t expected, Reply& reply) {
+// `seeks`: none is expected, but what is there must be valid, and behind the last one the line must be high.
+constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t expected, bool seeks, Reply& reply) {
   for (; reply.info_count < reply.infos.size(); first += info_bits) {
     const bool required = reply.info_count < expected;
-    if (first + info_bits > bits.size) return required ? Error::truncated : Error::none;
+    if (first + info_bits > bits.size) {
+      if (required) return Error::truncated;
+      break;
+    }
     if (bits[first] || !is_checked(bits, first + 1, parameter_bits)) {
-      return required ? Error::bad_checksum : Error::none;
+      if (required) return Error::bad_checksum;
+      break;
     }
     Info& info = reply.infos[reply.info_count++];
     info.warning = bits[first + 1];
@@ -275,7 +283,8 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
     info.number = static_cast<std::uint8_t>(bits.load(first + 4, 5));
     info.content = static_cast<std::uint16_t>(bits.load(first + 9, 16));
   }
-  return Error::none;
+  const bool rests = first >= bits.size || (bits[first] && bits.end_of_run(first) == bits.size);
+  return seeks && !rests ? Error::bad_checksum : Error::none;
 }
 }  // namespace detail
 
@@ -310,7 +319,8 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
   const auto count = static_cast<unsigned>(covered - error_bits);
   reply.position = detail::reversed(bits.load(first + error_bits, count), count);
   if (is_22(code)) {
-    const Error error = detail::take_infos(bits, first + covered + crc_bits, format.infos(), reply);
+    const std::size_t expected = request.seeks_infos ? 0 : format.infos();
+    const Error error = detail::take_infos(bits, first + covered + crc_bits, expected, request.seeks_infos, reply);
     if (error != Error::none) return error;
   }
   return reply;
@@ -380,6 +390,18 @@ inline constexpr std::uint32_t warning = 1u << 15;  ///< WRN: at least one warni
 /// Returns the alarms of the words of the operating status.
 [[nodiscard]] constexpr std::uint32_t alarms_of(std::uint16_t errors, std::uint16_t warnings) {
   return (errors & alarm::errors) | (std::uint32_t{warnings} << alarm::warnings_shift & alarm::warnings);
+}
+
+/// Completes a reading by the error messages and warnings that were read behind it.
+constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t warnings) {
+  // WRN is known from additional information only, unless a warning is set.
+  const bool knows_group = warnings != 0 || (reading.alarms_reported & alarm::warning) != 0;
+  reading.alarms &= alarm::error | alarm::warning;
+  reading.alarms |=
+      alarms_of(errors, warnings) | (errors != 0 ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
+  reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
+  if (errors != 0) reading.singleturn_valid_bits = 0;
+  reading.multiturn_valid = reading.multiturn_valid && errors == 0;
 }
 
 /// Returns whether an error bit says that the position is wrong.

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/endat/host.hpp"
 
 namespace absenc::endat {
 
@@ -39,14 +40,22 @@ Part<std::uint16_t> read_word_21(Dialog& dialog, std::uint8_t& selected, WordPla
 struct Selection {
   std::uint8_t info1 = 0;
   std::uint8_t info2 = 0;
+
+  friend bool operator==(const Selection&, const Selection&) = default;
 };
 
 std::uint8_t code_of(const Info* info) { return info == nullptr ? 0 : static_cast<std::uint8_t>(0x40 | info->number); }
 
-// Finds out which informations are selected, without which a supplement would collide with them.
+// Finds out which informations are selected: a supplement would collide with one that the host does not know of. Two
+// positions in a row must agree, because ones behind the position, as a damaged line gives them, mean none.
 Part<Selection> find_selection(Dialog& dialog) {
-  const Reply reply = co_await dialog.ask({.code = Code::position_22, .seeks_infos = true});
-  const Selection found{code_of(reply.info(1)), code_of(reply.info(2))};
+  Selection found;
+  for (bool first = true;; first = false) {
+    const Reply reply = co_await dialog.ask({.code = Code::position_22, .seeks_infos = true});
+    const Selection now{code_of(reply.info(1)), code_of(reply.info(2))};
+    if (!first && now == found) break;
+    found = now;
+  }
   Format format = dialog.format();
   format.info1 = found.info1;
   format.info2 = found.info2;
@@ -163,8 +172,10 @@ Part<bool> know_resolution(Dialog& dialog) {
 }
 
 Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
-  const Reply reply = co_await dialog.ask({.code = position_code(dialog.format())});
-  found.reading = dialog.last_reading();
+  Reply reply = co_await dialog.ask({.code = position_code(dialog.format())});
+  found.reading = drop_unasked(dialog.format(), dialog.request().code, reply);
+  found.reading.latched = dialog.begun_at();
+  found.reading.received = dialog.received_at();
   static_cast<Values&>(found) = values_of(dialog.format(), dialog.request(), reply);
   co_return found.reading;
 }
@@ -175,19 +186,11 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
   const std::uint16_t errors = co_await read_word_21(dialog, selected, error_word, "");
   const std::uint16_t warnings = co_await read_word_21(dialog, selected, warning_word, "");
   co_await dialog.rest(long_recovery);
-  const std::uint32_t group = found.reading.alarms & (alarm::error | alarm::warning);
-  const std::uint32_t alarms =
-      alarms_of(errors, warnings) | group | (errors != 0 ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
-  found.alarms = static_cast<std::uint16_t>(alarms);
+  add_alarms(found.reading, errors, warnings);
+  found.alarms = static_cast<std::uint16_t>(found.reading.alarms);
   found.command.reset();  // the values are of several exchanges
   found.start.reset();
-  found.reading.alarms = alarms;
-  // WRN is known from additional information only, unless a warning is set.
-  const bool knows_group = warnings != 0 || (found.reading.alarms_reported & alarm::warning) != 0;
-  found.reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
-  if (errors != 0) found.reading.singleturn_valid_bits = 0;
-  found.reading.multiturn_valid = found.reading.multiturn_valid && errors == 0;
-  co_return alarms;
+  co_return found.reading.alarms;
 }
 
 }  // namespace
@@ -196,7 +199,8 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
 
 Procedure read_position(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
-  co_await look(dialog, found);
+  const Reading reading = co_await look(dialog, found);
+  if (reading.alarms != 0) co_await read_alarms(dialog, found);
   co_return done;
 }
 
@@ -547,6 +551,7 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
   const Selection before = co_await find_selection(dialog);
   for (const std::int64_t code : arguments) {
     if (code != 0) co_await select_22(dialog, static_cast<std::uint8_t>(code), "the information could not be selected");
+    co_await find_selection(dialog);
   }
   co_await look(dialog, found);
   const bool has_first = arguments[0] == 0 || arguments[0] == mrs::stop_info_1 || found.info1_code == arguments[0];
@@ -562,6 +567,7 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
 Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const Selection before = co_await find_selection(dialog);
+  co_await select_22(dialog, mrs::nothing, "");
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
   found.temperature = (static_cast<double>(tenths) * 10 - 27'315) / 100;

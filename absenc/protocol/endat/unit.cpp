@@ -6,6 +6,7 @@
 
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/endat/device.hpp"
+#include "absenc/protocol/endat/host.hpp"
 #include "absenc/protocol/endat/procedures.hpp"
 #include "absenc/protocol/endat/vectors.hpp"
 
@@ -116,7 +117,7 @@ Procedure send(Dialog& dialog, ProcedureResult& result, Arguments arguments) {
 }
 
 constexpr auto commands = std::array{
-    reading<report, ask_for_position>(read_info_of)
+    reading<report, ask_for_position, ReadPosition>(read_info_of)
         .or_when(is_asked, run<read_position, ask_to_select<area::maker_1>>(read_info_of)),
     run<read_status, ask_for_position_with>({.name = "status",
                                              .verb = Verb::read_part,
@@ -196,6 +197,7 @@ constexpr auto options = OptionsOf{
 };
 
 constexpr auto models = std::array{
+    ModelText{"asked", "resolution asked from the encoder", 0, "singleturn_bits=0"},
     ModelText{"ECN-1325", "rotary, 25 bits, EnDat 2.2", 12'000, "singleturn_bits=25"},
     ModelText{"EQN-1337", "rotary, 25 bits, 4096 turns, EnDat 2.2", 12'000, "singleturn_bits=25 multiturn_bits=12"},
     ModelText{"ECN-1313", "rotary, 13 bits, EnDat 2.1", 12'000, "singleturn_bits=13 version=2.1"},
