@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "absenc/protocol/author/bit_host.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/author/text.hpp"
