@@ -60,6 +60,7 @@ constexpr std::uint32_t tick_is_pending = 1u << 26;
 std::uint32_t counts_of_period = 0;
 Time period_of_ticks{};
 Time begin_of_tick{};  // start of the present period of the tick; only the tick's interrupt writes it
+Time latest{};         // greatest time that `now` has returned
 }  // namespace
 
 void start_clock(Time period) {
@@ -83,8 +84,12 @@ Time now() {
     left = register_at(value);
     begin += period_of_ticks;
   }
+  Time time = begin + Time((counts_of_period - 1 - left) * frequency.nanoseconds / frequency.counts);
+  // QEMU may restart the counter some instructions before it sets the bit above.
+  if (time < latest) time += period_of_ticks;
+  latest = time;
   asm volatile("msr primask, %0" : : "r"(masked) : "memory");
-  return begin + Time((counts_of_period - 1 - left) * frequency.nanoseconds / frequency.counts);
+  return time;
 }
 
 extern "C" void tick() {
