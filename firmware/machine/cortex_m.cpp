@@ -60,7 +60,6 @@ constexpr std::uint32_t tick_is_pending = 1u << 26;
 std::uint32_t counts_of_period = 0;
 Time period_of_ticks{};
 Time begin_of_tick{};  // start of the present period of the tick; only the tick's interrupt writes it
-Time latest{};         // greatest time that `now` has returned
 }  // namespace
 
 void start_clock(Time period) {
@@ -82,14 +81,11 @@ Time now() {
   // the counter has restarted, but the interrupt of the tick has not run yet
   if ((register_at(interrupts) & tick_is_pending) != 0) {
     left = register_at(value);
+    if (left == 0) left = counts_of_period - 1;  // the counter is 0 until it takes the value of `reload`
     begin += period_of_ticks;
   }
-  Time time = begin + Time((counts_of_period - 1 - left) * frequency.nanoseconds / frequency.counts);
-  // QEMU may restart the counter some instructions before it sets the bit above.
-  if (time < latest) time += period_of_ticks;
-  latest = time;
   asm volatile("msr primask, %0" : : "r"(masked) : "memory");
-  return time;
+  return begin + Time((counts_of_period - 1 - left) * frequency.nanoseconds / frequency.counts);
 }
 
 extern "C" void tick() {
