@@ -76,7 +76,9 @@ class AcceleratingShaft final : public Shaft {
 class CycleCheck {
  public:
   /// Makes a check. `jitter`: greatest time by which the machine may note the time of an event too late.
-  explicit CycleCheck(Time jitter) : jitter_(jitter) {}
+  /// `compares_speed`: whether the drive also refuses positions that the speed of its last two readings contradicts; it
+  /// needs that where single wrong bits may pass the check of the frame.
+  CycleCheck(Time jitter, bool compares_speed) : jitter_(jitter), compares_speed_(compares_speed) {}
 
   void take(const host::Cycle& cycle, Time next) {
     ++counts_[static_cast<std::size_t>(cycle.kind)];
@@ -85,7 +87,7 @@ class CycleCheck {
     const Reading& reading = cycle.reading;
     // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached: by the
     // speed limit, and by the speed of the last two readings.
-    if (!first_.confirms(reading) || !continues(reading)) {
+    if (!first_.confirms(reading) || (compares_speed_ && !continues(reading))) {
       ++implausible_;
       return;
     }
@@ -94,6 +96,8 @@ class CycleCheck {
     if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
     span_ = reading.latched - latched_;
     latched_ = reading.latched;
+    step_ = distance(position_, counts_of(reading), reading.singleturn_bits + reading.multiturn_bits);
+    position_ = counts_of(reading);
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
     if (extrapolation_.bits() != reading.singleturn_bits + reading.multiturn_bits) return;
@@ -124,14 +128,18 @@ class CycleCheck {
     if (!extrapolation_.valid() || gap > longest_gap) return true;
     const unsigned bits = extrapolation_.bits();
     if (bits != reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0)) return true;
-    const auto apart = [bits](std::uint64_t from, std::uint64_t to) {
-      const std::int64_t distance = with_sign(to - from, bits);
-      return distance < 0 ? -distance : distance;
-    };
-    constexpr std::int64_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
-    const std::int64_t error = 1 + apart(extrapolation_.at(latched_), extrapolation_.at(latched_ + jitter_));
-    const std::int64_t allowed = by_acceleration + 2 * error + 2 * error * (gap / span_);
-    return apart(extrapolation_.at(reading.latched), counts_of(reading)) <= allowed;
+    // Numbers of 32 bits, because a processor without division is slow with 64.
+    const auto gap_ns = static_cast<std::uint32_t>(gap.count());
+    const auto span_ns = static_cast<std::uint32_t>(span_.count());
+    constexpr std::uint32_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
+    const std::uint32_t error = 1 + step_ * (static_cast<std::uint32_t>(jitter_.count()) / 100) / (span_ns / 100);
+    const std::uint32_t allowed = by_acceleration + 2 * error * (1 + gap_ns / span_ns);
+    return distance(extrapolation_.at(reading.latched), counts_of(reading), bits) <= allowed;
+  }
+  // Returns the distance in counts between two positions of `bits` bits, at most 100 000.
+  [[nodiscard]] static std::uint32_t distance(std::uint64_t from, std::uint64_t to, unsigned bits) {
+    const std::int64_t counts = with_sign(to - from, bits);
+    return static_cast<std::uint32_t>(std::min<std::int64_t>(counts < 0 ? -counts : counts, 100'000));
   }
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
@@ -151,9 +159,12 @@ class CycleCheck {
   }
 
   Time jitter_;
+  bool compares_speed_;
   host::Extrapolation extrapolation_{};
-  Time latched_{};  // time at which the last new and plausible reading was latched
-  Time span_{};     // time between the latches of the last two such readings
+  Time latched_{};              // time at which the last new and plausible reading was latched
+  Time span_{};                 // time between the latches of the last two such readings
+  std::uint64_t position_ = 0;  // position of the last such reading
+  std::uint32_t step_ = 0;      // distance of the positions of the last two such readings, in counts
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;

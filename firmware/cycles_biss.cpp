@@ -102,7 +102,7 @@ class Bench {
   Time end_ = never;
   Random random_{};
   std::uint32_t faults_ = 0;
-  CycleCheck check_{1us};
+  CycleCheck check_{1us, true};
 };
 
 }  // namespace

@@ -133,7 +133,7 @@ class Bench {
   Time now_{};
   Random random_{};
   std::uint32_t faults_ = 0;
-  CycleCheck check_{5us};
+  CycleCheck check_{5us, false};
 };
 
 }  // namespace

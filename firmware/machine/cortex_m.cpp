@@ -81,6 +81,7 @@ Time now() {
   // the counter has restarted, but the interrupt of the tick has not run yet
   if ((register_at(interrupts) & tick_is_pending) != 0) {
     left = register_at(value);
+    if (left == 0) left = counts_of_period - 1;  // the counter is 0 until it takes the value of `reload`
     begin += period_of_ticks;
   }
   asm volatile("msr primask, %0" : : "r"(masked) : "memory");

@@ -53,7 +53,8 @@ class Rides {
  private:
   [[nodiscard]] static bool is_service(const Command& command) {
     const bool other = command.verb == Verb::read || command.verb == Verb::scan;
-    return !other && command.verb != Verb::config_set;
+    // A setting that changes an option changes the form of the positions, or the address, while the cycles run.
+    return !other && command.changes_option.empty();
   }
 
   void ride_alone() {
