@@ -28,6 +28,8 @@ FREESTANDING_HEADERS = set(
     """algorithm array bit bits/chrono.h cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
+# Folders of absenc/os for one system each. Only they include headers of that system.
+SYSTEMS = ("linux", "windows")
 # Layers in which every header is public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
 # Headers of other libraries that take long to compile.
@@ -35,7 +37,8 @@ HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
     r"^(sys|linux|asm|asm-generic|net|netinet|arpa|fuse3)/|"
-    r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal|dlfcn)\.h(pp)?$"
+    r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal|dlfcn|ifaddrs|"
+    r"windows|winsock2|ws2tcpip)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 # The patterns rely on clang-format, which puts types at namespace scope at the beginning of a line.
@@ -53,6 +56,11 @@ def unit_of(path):
     """Returns the protocol unit of a file, such as "tformat", or None."""
     is_unit = path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 and path.parts[2] != "author"
     return path.parts[2] if is_unit else None
+
+
+def system_of(path):
+    """Returns the system to which a file in absenc/os belongs, such as "linux", or None."""
+    return path.parts[2] if path.parts[:2] == ("absenc", "os") and path.parts[2] in SYSTEMS else None
 
 
 def built_on(root, unit):
@@ -80,6 +88,8 @@ def layer_fault(root, path, target):
         return None
     if is_test(target):
         return "is only for tests"
+    if system_of(target) and system_of(target) != system_of(path):
+        return f"is only for absenc/os/{system_of(target)}"
     unit, other = unit_of(path), unit_of(target)
     if other and other != unit:
         if unit is None:
@@ -98,8 +108,8 @@ def system_fault(path, header):
         return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
     if is_public(path) and re.search(r"[/.]", header):
         return "is no header of C++: not for a public header"
-    at_os = path.parts[:2] == ("absenc", "os") or path.parts[0] == "bench"
-    return "belongs into absenc/os" if OS_HEADER.search(header) and not at_os else None
+    of_system = system_of(path) or path.parts[0] == "bench"
+    return "belongs into a folder of absenc/os" if OS_HEADER.search(header) and not of_system else None
 
 
 def client_circles(root):
@@ -185,7 +195,8 @@ class SelfTest(unittest.TestCase):
         "absenc/host/drive.hpp": '#include "absenc/link/step.hpp"\n',
         "absenc/sim/line.hpp": '#include <vector>\n#include "absenc/link/step.hpp"\n',
         "absenc/os/error.hpp": '#include <string>\n#include "absenc/core/bits.hpp"\n',
-        "absenc/os/serial.hpp": '#include <poll.h>\n#include "absenc/os/error.hpp"\n',
+        "absenc/os/serial.hpp": '#include "absenc/os/error.hpp"\n',
+        "absenc/os/linux/sys_file.hpp": '#include <sys/stat.h>\n#include "absenc/os/error.hpp"\n',
         "absenc/capture/open.hpp": "",
         "absenc/client/encoder.hpp": '#include "absenc/client/row.hpp"\n#include "absenc/sim/line.hpp"\n',
         "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\nnamespace absenc::client {\nclass Row {};\n}\n',
@@ -196,7 +207,7 @@ class SelfTest(unittest.TestCase):
         "absenc/client/tap/run.hpp": '#include "absenc/client/captures/run.hpp"\n',
         "absenc/serve/http.hpp": '#include "absenc/client/text/rows.hpp"\n',
         "absenc/serve/http.cpp": "#include <microhttpd.h>\n",
-        "absenc/os/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/link/step.hpp"\n',
+        "absenc/os/linux/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/os/linux/sys_file.hpp"\n',
         "tools/absenc/main.cpp": '#include <CLI/CLI.hpp>\n#include "absenc/protocol/all.hpp"\n',
         "tools/absenc/text.hpp": "#include <string>\n",
     }
@@ -233,7 +244,10 @@ class SelfTest(unittest.TestCase):
             ("absenc/sim/line.hpp", '#include "absenc/host/drive.hpp"'),
             ("absenc/sim/line.hpp", '#include "absenc/os/none.hpp"'),
             ("absenc/sim/line.hpp", "#include <unistd.h>"),
-            ("absenc/os/serial.cpp", '#include "absenc/protocol/unit.hpp"'),
+            ("absenc/os/linux/serial.cpp", '#include "absenc/protocol/unit.hpp"'),
+            ("absenc/os/serial.hpp", "#include <poll.h>"),
+            ("absenc/os/serial.hpp", '#include "absenc/os/linux/sys_file.hpp"'),
+            ("absenc/client/text/row.cpp", '#include "absenc/os/linux/sys_file.hpp"'),
             ("absenc/os/error.hpp", '#include "absenc/os/serial.hpp"'),
             ("absenc/client/encoder.hpp", '#include "absenc/client/text/rows.hpp"'),
             ("absenc/client/encoder.hpp", '#include "absenc/capture/open.hpp"'),

@@ -33,9 +33,10 @@ STANDARD = {"linux-vdso", "libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86
 FOREIGN = re.compile(r"nlohmann|toml::|\bH5[A-Z]|\bhwy::|\b(zip|unz)[A-Z]|libdeflate|\bgpiod_line_find")
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-# Expected output of the example: it prints the speed as soon as enough positions for an average were read.
+# Expected output of read_by_name: it prints positions, then the speed, as soon as enough positions for an average were
+# read.
 BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"
-# A program like firmware, with a virtual encoder whose shaft is at 7.25 turns.
+# A program that uses the library as firmware does. It reads a virtual encoder whose shaft is at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
 #include <cstdio>

@@ -2,8 +2,6 @@
 // A second process of this program, for code that must not be able to crash the first one.
 #pragma once
 
-#include <sys/types.h>
-
 #include <string>
 #include <vector>
 
@@ -39,14 +37,14 @@ class ChildProcess {
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   [[nodiscard]] const Channel& channel() const { return channel_; }
-  [[nodiscard]] pid_t number() const { return number_; }
+  [[nodiscard]] int number() const { return number_; }
   /// Waits up to `longest` for the process to end, then kills it. Returns how the process failed, for example "with
   /// status 1"; "" if it succeeded.
   std::string end(Time longest);
 
  private:
   Channel channel_;
-  pid_t number_ = -1;
+  int number_ = -1;
 };
 
 /// Returns the child's end of the channel; the child must call this first. `name`: name of the child in process

@@ -2,8 +2,6 @@
 // An open file descriptor that closes itself.
 #pragma once
 
-#include <unistd.h>
-
 #include <utility>
 
 namespace absenc::os {
@@ -20,9 +18,7 @@ class Descriptor {
   }
   ~Descriptor() { close(); }
 
-  void close() {
-    if (number_ >= 0) ::close(std::exchange(number_, -1));
-  }
+  void close();
 
   /// Gives up ownership and returns the number of the descriptor, which the caller must close.
   [[nodiscard]] int release() { return std::exchange(number_, -1); }

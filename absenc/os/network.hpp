@@ -9,6 +9,7 @@
 
 #include "absenc/core/time.hpp"
 #include "absenc/os/descriptor.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::os {
 
@@ -28,11 +29,6 @@ class Datagrams {
 /// Returns the addresses of the name `host` as text. Throws Failure `not_found`.
 [[nodiscard]] std::vector<std::string> addresses_of(const std::string& host);
 
-/// Directions in which a socket is ready: to be read or written without blocking.
-struct Ready {
-  bool to_read = false;
-  bool to_write = false;
-};
 /// Waits at most `longest` until `socket` can be read; with `for_writing` until it can be read or written.
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 

@@ -2,8 +2,6 @@
 // The clock of all ports, and waits that Ctrl-C ends.
 #pragma once
 
-#include <poll.h>
-
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -42,14 +40,28 @@ class CancelCheck {
   const std::function<bool()>* outer_;
 };
 
-/// Returns the time of CLOCK_MONOTONIC.
+/// Returns the time of the system's monotonic clock (Linux: CLOCK_MONOTONIC).
 [[nodiscard]] Time now();
 
 inline constexpr std::size_t most_watched = 32;
 
-/// Blocks until a descriptor in `watched` (at most `most_watched`) has an event, and returns true; returns false if
+/// Directions in which a descriptor is ready: can be read or written without blocking. One that is closed at the other
+/// end, or has an error, counts as ready to be read.
+struct Ready {
+  bool to_read = false;
+  bool to_write = false;
+};
+
+/// A descriptor that `wait_for` watches.
+struct Watched {
+  int descriptor = -1;  // -1: is not watched
+  Ready wanted{.to_read = true};
+  Ready ready{};  // set by `wait_for`; `to_read` also if it was not wanted but the other end is closed
+};
+
+/// Blocks until a descriptor in `watched` (at most `most_watched`) is ready, and returns true; returns false if
 /// `deadline` is reached first. Throws Interrupted, Ended and Failure.
-bool wait_for(std::span<pollfd> watched, Time deadline);
+bool wait_for(std::span<Watched> watched, Time deadline);
 
 /// Sleeps until `time` or somewhat longer, never shorter. Throws as `wait_for` does.
 void sleep_until(Time time);

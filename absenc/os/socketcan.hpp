@@ -2,6 +2,7 @@
 // A CAN interface of Linux (SocketCAN), real (can0) or virtual (vcan0).
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,9 +27,9 @@ struct CanKernel {
   virtual int set(int descriptor, int level, int name, const void* value, std::size_t size);
   /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);
-  virtual ssize_t write(int descriptor, const can_frame& frame);
+  virtual std::ptrdiff_t write(int descriptor, const can_frame& frame);
   /// Reads a frame. `stamp`: calendar time of the kernel's stamp; empty if there is none.
-  virtual ssize_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp);
+  virtual std::ptrdiff_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp);
   virtual ClockPair clocks();
 };
 [[nodiscard]] CanKernel& system_can_kernel();

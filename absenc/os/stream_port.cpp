@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/stream_port.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <utility>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
-
-using namespace std::chrono_literals;
 
 StreamPort::StreamPort() : waiting_(os::now()) {}
 
@@ -118,54 +112,6 @@ Time StreamPort::pulse_width(ExtraWire, Time requested) const { return requested
 void StreamPort::change_rate(std::uint32_t rate) {
   throw Failure(Failure::Kind::unsupported,
                 "this kind of port cannot change to " + std::to_string(rate) + " baud: use a serial port");
-}
-
-DescriptorPort::DescriptorPort(Descriptor descriptor, std::string name)
-    : descriptor_(std::move(descriptor)), name_(std::move(name)) {
-  const int flags = ::fcntl(descriptor_.get(), F_GETFL);
-  if (flags < 0 || ::fcntl(descriptor_.get(), F_SETFL, flags | O_NONBLOCK) < 0) throw system_failure(name_, errno);
-  poller().add(descriptor_.get());
-}
-
-ssize_t DescriptorPort::write_some(Bytes bytes) { return ::write(descriptor(), bytes.data(), bytes.size()); }
-
-std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
-  const ssize_t size = ::read(descriptor(), into.data(), into.size());
-  if (size > 0) return static_cast<std::size_t>(size);
-  if (size == 0) fail(0);
-  if (errno != EAGAIN && errno != EINTR) fail(errno);
-  return 0;
-}
-
-void DescriptorPort::write_all(Bytes bytes) {
-  // If the other side reads no byte for this long, it counts as lost.
-  constexpr Time patience = 3s;
-  for (;;) {
-    const ssize_t size = write_some(bytes);
-    if (size < 0 && errno != EAGAIN && errno != EINTR) fail(errno);
-    if (size > 0) bytes = bytes.subspan(static_cast<std::size_t>(size));
-    if (bytes.empty()) return;
-    pollfd writable{descriptor(), POLLOUT, 0};
-    const Time limit = os::now() + patience;
-    if (wait_for({&writable, 1}, std::min(limit, end()))) continue;
-    if (os::now() >= end()) throw Ended{};
-    throw Failure(Failure::Kind::lost, name_ + " takes no more bytes: is the other end still running?");
-  }
-}
-
-void DescriptorPort::fail(int error) const {
-  switch (error) {
-    case 0:  // end of the stream: the other side has closed it
-    case EIO:
-    case ENXIO:
-    case ENODEV:
-    case EPIPE:
-    case ECONNRESET:
-    case ETIMEDOUT:
-      throw Failure(Failure::Kind::lost, name_ + " went away: unplugged, or closed at the other end?");
-    default:
-      throw system_failure(name_, error);
-  }
 }
 
 }  // namespace absenc::os

@@ -103,7 +103,7 @@ class DescriptorPort : public StreamPort {
   [[nodiscard]] int descriptor() const { return descriptor_.get(); }
 
   /// Writes as many bytes as possible, like write(2).
-  virtual ssize_t write_some(Bytes bytes);
+  virtual std::ptrdiff_t write_some(Bytes bytes);
 
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;

@@ -18,7 +18,7 @@ class TcpPort final : public DescriptorPort {
   TcpPort(const std::string& host, std::uint16_t port);
 
  private:
-  ssize_t write_some(Bytes bytes) override;
+  std::ptrdiff_t write_some(Bytes bytes) override;
 };
 
 }  // namespace absenc::os

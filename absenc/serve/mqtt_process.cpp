@@ -71,11 +71,11 @@ class MqttProcess {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
     const bool reads = outgoing_.size() < outgoing_limit;
     const bool writes = broker >= 0 && ::mosquitto_want_write(client_);
-    const auto events = [](bool in, bool out) { return static_cast<short>((in ? POLLIN : 0) | (out ? POLLOUT : 0)); };
-    std::array<pollfd, 2> watched{
-        {{parent_.get(), events(true, !outgoing_.empty()), 0}, {broker, events(reads, writes), 0}}};
+    std::array<os::Watched, 2> watched{
+        {{.descriptor = parent_.get(), .wanted = {.to_read = true, .to_write = !outgoing_.empty()}},
+         {.descriptor = broker, .wanted = {.to_read = reads, .to_write = writes}}}};
     os::wait_for(watched, std::min(next_sign_of_life_, os::now() + sign_of_life_interval));
-    broker_events_ = watched[1].revents;
+    broker_ready_ = watched[1].ready;
     if (!parent_.receive(incoming_.bytes)) return false;
     while (std::optional<WireFields> frame = incoming_.next()) take(*frame);
     return parent_.send(outgoing_);
@@ -172,7 +172,7 @@ class MqttProcess {
     }
     if (qos != 0) numbers_[given] = number;
     // The broker may have sent a reason or acknowledgements before it closed the connection, so these are read.
-    if (connection_failed) broker_events_ |= POLLHUP;
+    if (connection_failed) broker_ready_.to_read = true;
   }
 
   // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent process.
@@ -180,10 +180,8 @@ class MqttProcess {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
     // mosquitto_loop_read is called even if the connection has ended, because it reports the reason.
-    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;
-    const bool reads = is_over || (broker_events_ & POLLIN) != 0;
-    const bool writes = (broker_events_ & POLLOUT) != 0;
-    errno = 0;  // libmosquitto reads errno after calls that do not set it
+    const auto [reads, writes] = broker_ready_;
+    errno = 0;  // libmosquitto reads errno even after calls that do not set it, so an old value must not remain
     int error = MOSQ_ERR_SUCCESS;
     // A TLS handshake begins with a read, even when the library wants to write.
     const bool begins = broker_.tls && !connected_ && writes;
@@ -194,7 +192,8 @@ class MqttProcess {
     note(error);
   }
 
-  // Reason codes of the broker below 128 are those of MQTT 3.1.1, which have their own texts.
+  // Handles the answer of the broker to CONNECT. A `reason` below 128 is a return code of MQTT 3.1.1, for which
+  // libmosquitto has other texts than for the reason codes of MQTT 5.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;
@@ -248,7 +247,7 @@ class MqttProcess {
   mosquitto* client_ = nullptr;
   // Numbers that the parent process has given messages; the keys are the numbers that libmosquitto has given them.
   std::unordered_map<int, std::uint32_t> numbers_{};
-  short broker_events_ = 0;
+  os::Ready broker_ready_{};
   Time next_sign_of_life_{};
   bool connects_ = false;
   bool connected_ = false;
@@ -262,7 +261,7 @@ int run_mqtt_process() {
     MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
     return 0;
   } catch (const std::exception&) {
-    return 1;  // the parent process detects that this process has ended
+    return 1;  // no message is needed: the parent process detects that this process has ended
   }
 }
 

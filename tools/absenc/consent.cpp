@@ -26,7 +26,7 @@ bool is_yes(std::string_view answer) {
 
 bool says_yes(const std::string& question) {
   print_prompt(question);
-  pollfd input{0, POLLIN, 0};
+  os::Watched input{.descriptor = 0};
   try {
     os::wait_for({&input, 1}, never);
   } catch (const os::Interrupted&) {

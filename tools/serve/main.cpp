@@ -115,7 +115,7 @@ int run_serve(const Invocation& invocation) {
   }
   try {
     while (!os::interrupted()) {
-      pollfd watched{hangups.get(), POLLIN, 0};
+      os::Watched watched{.descriptor = hangups.get()};
       if (os::wait_for({&watched, 1}, os::now() + between_looks) && os::take_hangup(hangups)) reload(server);
     }
   } catch (const os::Interrupted&) {
