@@ -124,7 +124,6 @@ std::span<const std::string_view> wires_of(LinkKind link) {
     case LinkKind::spi:
       return spi;
     case LinkKind::clocked:
-    case LinkKind::clocked_bidirectional:
       return clocked;
     case LinkKind::clocked_bidirectional:
       return both_ways;
