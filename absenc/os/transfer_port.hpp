@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps and events (link/step.hpp) on ports whose host clocks every item, and which carry out a transfer at once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "absenc/link/port.hpp"
+#include "absenc/os/waiting.hpp"
+
+namespace absenc::os {
+
+/// Base class of ports for encoders with SPI and for clocked encoders. `begin` and `wait` throw Failure, Interrupted or
+/// Ended.
+class TransferPort : public Port<std::uint8_t> {
+ public:
+  /// `kind`: a link whose host clocks, else throws invalid_argument.
+  explicit TransferPort(LinkKind kind);
+  TransferPort(const TransferPort&) = delete;
+  TransferPort& operator=(const TransferPort&) = delete;
+  virtual ~TransferPort() = default;
+
+  [[nodiscard]] Time now() final;
+  void begin(const Step<std::uint8_t>& step) final;
+  [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
+
+ protected:
+  /// What a transfer has received: the items of an SPI link, or the bits of a clocked one, packed MSB first.
+  struct Received {
+    std::vector<std::uint8_t> items{};
+    std::size_t bits = 0;   // number of bits of a clocked link
+    bool idle_low = false;  // whether the data line was low in all idle clocks; false if there were none
+    Time at{};              // end of the transfer; it may have ended earlier by up to `late`
+    Time late{};
+  };
+
+  [[nodiscard]] LinkKind kind() const { return kind_; }
+  /// Carries out a transfer, not before `step.at`. Leaves `received` empty if nothing was clocked.
+  virtual void exchange(const Step<std::uint8_t>& step, Received& received) = 0;
+  /// Switches to another clock rate, in Hz.
+  virtual void change_rate(std::uint32_t rate) = 0;
+
+  /// Moves `bits` samples behind the first `idle` ones out of `samples` into `received`.
+  static void extract(Bytes samples, std::size_t idle, std::size_t bits, Received& received);
+
+ private:
+  LinkKind kind_;
+  Received received_{};
+  Waiting<std::uint8_t> waiting_;
+  bool sent_pending_ = false;      // whether the event `sent` is still to be reported
+  bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
+};
+
+}  // namespace absenc::os
