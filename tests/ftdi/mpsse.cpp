@@ -156,6 +156,7 @@ bool Mpsse::execute(std::size_t at, std::size_t size) {
 
 void Mpsse::shift(std::uint8_t code, std::size_t count, Bytes data) {
   const bool starts_high = (levels_ & clock) != 0;
+  rate_ = 1e9 / (2 * half_ns());
   const bool writes_any = (code & (writes | writes_tms)) != 0;
   // Data change at the second edge of a pulse and are sampled at the first one.
   if (writes_any && ((code & write_falling) != 0) == starts_high) ++misused_;

@@ -48,8 +48,8 @@ class Mpsse {
   [[nodiscard]] unsigned misused() const { return misused_; }
   /// Returns the number of commands that no MPSSE has [3.2].
   [[nodiscard]] unsigned unknown() const { return unknown_; }
-  /// Returns the clock rate in Hz.
-  [[nodiscard]] double rate() const { return 1e9 / (2 * half_ns()); }
+  /// Returns the clock rate of the last shift command in Hz.
+  [[nodiscard]] double rate() const { return rate_; }
   [[nodiscard]] std::uint8_t levels() const { return levels_; }
 
   /// The level of the input GPIOL1, for which the commands 0x88, 0x89 and 0x94, 0x95 wait.
@@ -86,6 +86,7 @@ class Mpsse {
   bool by_five_ = true;  // after reset the H chips count like the FT2232D [6.1]
   bool loopback_ = false;
   bool three_phases_ = false;
+  double rate_ = 0;
   unsigned misused_ = 0, unknown_ = 0;
 };
 

@@ -172,6 +172,32 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
   }
 }
 
+namespace {
+
+// A bit is sampled half a period after the edge at which the encoder changes it, so a clock that is too fast shows how
+// long the way from edge to data is. BiSS finds its start bit, so there a delay only shifts the bits by whole clocks.
+void judge_clocks(const Case& one, std::vector<Finding>& findings) {
+  const std::vector<ClockTrial>& clocks = one.seen.clocks;
+  const auto failed = std::ranges::find_if(clocks, [](const ClockTrial& trial) { return trial.good < trial.tried; });
+  if (failed == clocks.begin()) return;
+  const ClockTrial& fastest = *std::prev(failed);
+  const auto half_ns = [](const ClockTrial& trial) { return 500'000'000 / trial.rate; };
+  std::string but;
+  std::string cause = "no clock that was tried is too fast for encoder and cable";
+  std::string action = "keep the clock";
+  if (failed != clocks.end()) {
+    but = fmt::format(", but only {} of {} at {} Hz", failed->good, failed->tried, failed->rate);
+    cause =
+        fmt::format("from the edge of the clock to the data the way takes {} to {} ns: transceivers, cable, encoder",
+                    half_ns(*failed), half_ns(fastest));
+    action = fmt::format("set speed={} or less", fastest.rate);
+  }
+  findings.push_back(finding(FindingKind::clock_range, {fmt::format("{}", clocks.front().rate),
+                                                        fmt::format("{}", fastest.rate), but, cause, action}));
+}
+
+}  // namespace
+
 void judge_line(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.line_errors > 0 && one.unit.link == LinkKind::can) {
@@ -204,6 +230,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
   judge_slowness(one, findings);
+  judge_clocks(one, findings);
 }
 
 namespace {

@@ -31,6 +31,13 @@ struct Trial {
   std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not
 };
 
+/// Readings with one clock rate.
+struct ClockTrial {
+  std::uint32_t rate = 0;  // Hz
+  std::size_t good = 0;    // readings without an error whose position is that of the slowest clock, if the shaft rested
+  std::size_t tried = 0;
+};
+
 /// The reason why the port could not be opened, or was lost.
 struct Refusal {
   os::Failure::Kind kind{};
@@ -64,12 +71,14 @@ struct Observations {
   std::vector<std::uint8_t> overfull_example{};
   std::size_t most_behind = 0;  // greatest number of further bytes after a good reply
   std::vector<Trial> trials{};
-  host::EchoMode echo_said{};     // echo mode that the user set
-  host::EchoMode echo{};          // echo mode at the end: that of the user, or detected
-  std::optional<Time> latency{};  // latency that the user set
-  Time computer_late{};           // greatest delay of this computer during the readings (os::DelayWatch)
-  host::SpeedLimit limit{};       // speed limit of the encoder's shaft
-  std::string clash{};            // address at which two encoders seem to reply, "address 3"; "": none
+  std::vector<ClockTrial> clocks{};   // readings with other clock rates, the slowest first; empty: none were tried
+  std::optional<bool> data_driven{};  // whether something drives the data pin of the port; nothing: not known
+  host::EchoMode echo_said{};         // echo mode that the user set
+  host::EchoMode echo{};              // echo mode at the end: that of the user, or detected
+  std::optional<Time> latency{};      // latency that the user set
+  Time computer_late{};               // greatest delay of this computer during the readings (os::DelayWatch)
+  host::SpeedLimit limit{};           // speed limit of the encoder's shaft
+  std::string clash{};                // address at which two encoders seem to reply, "address 3"; "": none
   bool complete = true;
 };
 

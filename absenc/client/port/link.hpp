@@ -17,10 +17,12 @@ struct Link {
   std::shared_ptr<void> owner;
   Port<std::uint8_t>* bytes = nullptr;  // the open port for bytes; either this or `frames` is set
   Port<CanFrame>* frames = nullptr;
-  Time latency{};                  // delay that the connection between this computer and the line adds to a reply
-  int realtime = 0;                // real-time priority, 1 to 99, of threads that use the port; 0: none
-  Time character{};                // duration of a character on the line; 0: unknown, or bytes take no time
-  std::string place;               // port in words, "/dev/ttyUSB0 at 2500000 baud"
+  Time latency{};     // delay that the connection between this computer and the line adds to a reply
+  int realtime = 0;   // real-time priority, 1 to 99, of threads that use the port; 0: none
+  Time character{};   // duration of a character on the line; 0: unknown, or bytes take no time
+  std::string place;  // port in words, "/dev/ttyUSB0 at 2500000 baud"
+  // looks whether something drives the data pin while the encoder is not clocked; null if the port cannot look
+  std::function<bool()> is_data_driven{};
   std::vector<std::string> notes;  // hints for the user about the port, as on a setting that slows it
 };
 
