@@ -23,7 +23,7 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATIO
 # The .pc files contain the prefix as a path relative to their folder, so that the installed tree can be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
-set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
+set(absenc_client_needs ${gpiod_LIBRARIES} ${ftdi_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
     ${fmt_LIBRARIES} ${tomlplusplus_LIBRARIES} ${hdf5_LIBRARIES})
 list(TRANSFORM absenc_client_needs PREPEND -l)
 list(JOIN absenc_client_needs " " absenc_client_needs)
@@ -40,6 +40,7 @@ install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT 
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
   install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
+  install(FILES cmake/60-absenc-ftdi.rules DESTINATION lib/udev/rules.d COMPONENT absenc)
   install(FILES docs/serve.md docs/mqtt.md docs/mqtt-schema.json docs/grafana-dashboard.json
           DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)

@@ -219,7 +219,8 @@ class Installed(Case):
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
             "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "share/doc/absenc/mqtt.md",
-            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service", *GUIDE})
+            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service",
+            "lib/60-absenc-ftdi.rules", *GUIDE})
         self.assertEqual(headers, public_headers())
 
     def test_headers_include_only_installed_ones(self):
@@ -465,7 +466,7 @@ class Packages(unittest.TestCase):
             "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
             "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
             "share/doc/absenc/mqtt.md", "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json",
-            "lib/systemd/system/absenc.service", *(f"{page}.gz" for page in GUIDE)})
+            "lib/systemd/system/absenc.service", "lib/udev/rules.d/60-absenc-ftdi.rules", *(f"{page}.gz" for page in GUIDE)})
         for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 

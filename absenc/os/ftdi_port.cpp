@@ -140,8 +140,13 @@ void FtdiPort::hold_low(Time until) {
   pause(settings_.bits(1) / 2, rest());
 }
 
+// Between two commands the clock rests for a time that AN 108 does not state. A BiSS encoder with an adaptive timeout
+// may end its frame after one and a half periods, so a line without idle clocks gets one command of whole bytes, with
+// up to seven more clocks than needed. SSI has idle clocks; its encoders wait for more than 10 us, and some send the
+// word again if there are more clocks.
 void FtdiPort::clock_in(const ByteStep& step, Received& received) {
-  const std::size_t clocks = settings_.idle_clocks + step.bits;
+  const std::size_t needed = settings_.idle_clocks + step.bits;
+  const std::size_t clocks = needed <= 8 || settings_.idle_clocks > 0 ? needed : (needed + 7) / 8 * 8;
   if (step.bits > 0) commands_.shift_in(clocks, idles_high(settings_.spi_mode));
   send(clocks, &received);
   if (step.bits == 0) return;

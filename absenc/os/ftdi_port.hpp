@@ -18,9 +18,10 @@ namespace absenc::os {
 /// edge at which it changes them; EnDat encoders need up to 0.2 us for that, and a cable of 25 m both ways 0.25 us.
 inline constexpr std::uint32_t highest_turning_rate = 2'000'000;
 
-/// A port on a channel of an FTDI chip. A transfer is one USB transfer each way. The channel is closed to other
-/// programs. On a clocked line the chip samples a bit at the falling edge, half a period after the encoder has changed
-/// it, because an MPSSE samples at the first edge of its pulses (AN 114).
+/// A port on a channel of an FTDI chip, which is closed to other programs. A transfer is one USB transfer each way. On
+/// a clocked line the chip samples a bit at the falling edge, half a period after the encoder has changed it, because
+/// an MPSSE samples at the first edge of its pulses (AN 114). Without idle clocks (BiSS) a transfer has up to seven
+/// additional clocks.
 class FtdiPort final : public TransferPort {
  public:
   /// Opens the channel at `place`, "SERIAL/B". The clock is the nearest that the chip's divider makes. Throws Failure.
