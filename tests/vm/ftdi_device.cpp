@@ -167,8 +167,9 @@ class Chip {
     for (;;) {
       const ssize_t size = ::read(out_, bytes.data(), bytes.size());
       if (size < 0) {
-        if (errno == EINTR || errno == EAGAIN || errno == ESHUTDOWN) continue;
-        return;
+        if (errno == EINTR || errno == EAGAIN) continue;
+        if (!wait_for_plug()) return;
+        continue;
       }
       ++writes;
       const std::lock_guard lock(mutex_);
@@ -197,12 +198,15 @@ class Chip {
       ++packets;
       if (::write(in_, bytes.data(), bytes.size()) >= 0) continue;
       if (errno == EINTR || errno == EAGAIN) continue;
-      if (errno == ESHUTDOWN) {  // unplugged: waits until it is plugged in again
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        continue;
-      }
-      return;
+      if (!wait_for_plug()) return;
     }
+  }
+
+  // Waits a moment after an error if it says that the chip is unplugged; otherwise returns false.
+  static bool wait_for_plug() {
+    if (errno != ESHUTDOWN) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return true;
   }
 
   int control_, in_ = -1, out_ = -1;
