@@ -84,11 +84,10 @@ bool Mpsse::execute(std::size_t at, std::size_t size) {
       reply(code);
       return true;
     }
-    const std::vector<std::uint8_t> all = commands_;
     if ((code & bitwise) != 0) {
-      shift(code, byte(1) % 8 + 1u, Bytes(all).subspan(at + 2, size - 2));
+      shift(code, byte(1) % 8 + 1u, Bytes(commands_).subspan(at + 2, size - 2));
     } else {
-      shift(code, 8 * (byte(1) + std::size_t{256} * byte(2) + 1), Bytes(all).subspan(at + 3, size - 3));
+      shift(code, 8 * (byte(1) + std::size_t{256} * byte(2) + 1), Bytes(commands_).subspan(at + 3, size - 3));
     }
     return true;
   }

@@ -192,8 +192,15 @@ class Chip {
           if (now >= ready) break;
           changed_.wait_for(lock, ready - now);
         }
-        const std::vector<std::uint8_t> replies = mpsse_.replies(os::now(), latency_, packet - 2);
+        // Each packet begins with the state; full packets may follow each other in one transfer.
+        std::vector<std::uint8_t> replies = mpsse_.replies(os::now(), latency_, packet - 2);
         bytes.insert(bytes.end(), replies.begin(), replies.end());
+        for (int more = 1; more < 64 && replies.size() == packet - 2; ++more) {
+          replies = mpsse_.replies(os::now(), latency_, packet - 2);
+          if (replies.empty()) break;
+          bytes.insert(bytes.end(), {0x32, 0x60});
+          bytes.insert(bytes.end(), replies.begin(), replies.end());
+        }
       }
       ++packets;
       if (::write(in_, bytes.data(), bytes.size()) >= 0) continue;

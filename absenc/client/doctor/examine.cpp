@@ -267,11 +267,19 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Reads with slower and faster clocks, up to the fastest that the document allows.
+  // Reads with slower and faster clocks, up to the fastest that the document allows. A reading is good if its position
+  // is also that of the readings before, provided that the shaft rested: SSI has no checksum.
   void sweep_clock() {
     const std::uint32_t set = address_.spi.speed.value_or(address_.line.rate);
     const std::uint32_t limit = address_.line.highest_rate != 0 ? address_.line.highest_rate : fastest_swept;
-    std::optional<std::int64_t> resting;  // position of all readings with the slowest clock; nothing: they differ
+    std::optional<std::int64_t> least;
+    std::optional<std::int64_t> most;
+    for (const Attempted& one : seen_.readings) {
+      if (one.error != Error::none || !one.reading) continue;
+      least = std::min(least.value_or(position(one)), position(one));
+      most = std::max(most.value_or(position(one)), position(one));
+    }
+    const bool rests = least && *most - *least <= resting_counts;
     for (const auto [times, divisor] : swept) {
       const std::uint32_t rate = set / divisor * times;
       if (rate > std::max(limit, set) || rate < slowest_swept) continue;
@@ -280,19 +288,16 @@ class Doctor {
       other.spi.speed = rate;
       std::vector<Attempted> attempts;
       ask<std::uint8_t>(other, trial_readings, attempts);
-      const auto position = [](const Attempted& one) {
-        return one.reading ? static_cast<std::int64_t>(one.reading->singleturn) : 0;
-      };
-      if (seen_.clocks.empty() && !attempts.empty() && count_good(attempts) == attempts.size()) {
-        const auto [least, most] = std::ranges::minmax_element(attempts, {}, position);
-        if (position(*most) - position(*least) <= resting_counts) resting = position(*least);
-      }
       const auto is_good = [&](const Attempted& one) {
-        return one.error == Error::none && (!resting || std::abs(position(one) - *resting) <= 2 * resting_counts);
+        const bool same = !rests || std::abs(position(one) - *least) <= 2 * resting_counts;
+        return one.error == Error::none && same;
       };
       const auto good = static_cast<std::size_t>(std::ranges::count_if(attempts, is_good));
-      if (!attempts.empty()) seen_.clocks.push_back({rate, good, attempts.size()});
+      if (!attempts.empty()) seen_.clocks.push_back({rate, good, attempts.size(), times == divisor});
     }
+  }
+  [[nodiscard]] static std::int64_t position(const Attempted& one) {
+    return one.reading ? static_cast<std::int64_t>(one.reading->singleturn) : 0;
   }
 
   // Takes up to `count` readings with these settings, none before `earliest`, and returns their duration, 0 if the port

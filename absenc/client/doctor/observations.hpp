@@ -34,8 +34,9 @@ struct Trial {
 /// Readings with one clock rate.
 struct ClockTrial {
   std::uint32_t rate = 0;  // Hz
-  std::size_t good = 0;    // readings without an error whose position is that of the slowest clock, if the shaft rested
+  std::size_t good = 0;    // readings without an error and, if the shaft rested, with the position of those before
   std::size_t tried = 0;
+  bool is_set = false;  // whether this is the clock that the user has set
 };
 
 /// The reason why the port could not be opened, or was lost.
