@@ -38,6 +38,9 @@ FtdiPort::FtdiPort(const std::string& place, LinkKind kind, const LineSettings& 
   channel_ = usb.open(adapter, where.channel);
   synchronise();
   apply(settings);
+  commands_.clear();
+  commands_.set_pins(rest());
+  send(0);
 }
 
 // Sends a command that no MPSSE has until the chip answers to it: what it answered before belongs to an earlier
@@ -90,16 +93,15 @@ void FtdiPort::apply(LineSettings settings) {
   }
   settings_ = settings;
   settings_.rate = clock->rate();
-  commands_.clear();
-  commands_.set_pins(rest());
-  commands_.set_divisor(clock->divisor);
-  send(0);
+  divisor_ = clock->divisor;
 }
 
+// The chip is told with the next transfer: a conversation may set its rate before each reading, and the rate before it
+// again afterwards.
 void FtdiPort::change_rate(std::uint32_t rate) {
   if (choice_.speed) return;
   const std::optional<MpsseClock> clock = MpsseClock::nearest(rate, base_, settings_.highest_rate);
-  if (clock && clock->rate() == settings_.rate) return;  // a conversation may set the rate before each reading
+  if (clock && clock->rate() == settings_.rate) return;
   LineSettings settings = settings_;
   settings.rate = rate;
   apply(settings);
@@ -119,6 +121,8 @@ void FtdiPort::exchange(const ByteStep& step, Received& received) {
   } else {
     reach(step.at);
   }
+  if (divisor_ != sent_divisor_) commands_.set_divisor(divisor_);
+  sent_divisor_ = divisor_;
   switch (kind()) {
     case LinkKind::clocked:
       return clock_in(step, received);

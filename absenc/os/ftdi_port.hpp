@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,7 @@ class FtdiPort final : public TransferPort {
 
  private:
   void exchange(const Step<std::uint8_t>& step, Received& received) override;
+  [[nodiscard]] std::uint32_t set_rate() const override { return settings_.rate; }
   void change_rate(std::uint32_t rate) override;
 
   void clock_in(const Step<std::uint8_t>& step, Received& received);
@@ -65,6 +67,8 @@ class FtdiPort final : public TransferPort {
   std::uint32_t base_;  // base clock of the chip in Hz
   std::unique_ptr<FtdiChannel> channel_;
   LineSettings settings_{};
+  std::uint16_t divisor_ = 0;
+  std::optional<std::uint16_t> sent_divisor_{};  // the divisor that the chip has; nothing: not known
   MpsseCommands commands_;
   std::vector<std::uint8_t> replies_;
   bool rests_low_ = false;  // whether the clock rests low, because the exchange goes on

@@ -112,6 +112,7 @@ TEST_F(FtdiEncoder, AReadingIsOneUsbTransfer) {
   FtdiPort port("", LinkKind::clocked, biss::line_settings, {}, usb);
   const unsigned before = usb.writes;
   for (int i = 0; i < 10; ++i) {
+    port.begin({.kind = ByteStep::Kind::configure, .rate = i % 2 == 0 ? 2'000'000u : 1'000'000u});
     biss::ReadPosition read(format);
     ASSERT_TRUE(run(read, port));
     ASSERT_EQ(read.error(), Error::none);

@@ -26,6 +26,7 @@ void TransferPort::begin(const ByteStep& step) {
       received_.bits = 0;
       received_.idle_low = false;
       exchange(step, received_);
+      used_rate_ = set_rate();
       sent_pending_ = true;
       received_pending_ = !received_.items.empty();
       waiting_.silence.sent(received_.at);

@@ -25,6 +25,9 @@ class TransferPort : public Port<std::uint8_t> {
   void begin(const Step<std::uint8_t>& step) final;
   [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
 
+  /// Returns the clock rate of the last transfer in Hz; before the first one, that which is set.
+  [[nodiscard]] std::uint32_t clock_rate() const { return used_rate_ != 0 ? used_rate_ : set_rate(); }
+
  protected:
   /// What a transfer has received: the items of an SPI link, or the bits of a clocked one, packed MSB first.
   struct Received {
@@ -38,6 +41,8 @@ class TransferPort : public Port<std::uint8_t> {
   [[nodiscard]] LinkKind kind() const { return kind_; }
   /// Carries out a transfer, not before `step.at`. Leaves `received` empty if nothing was clocked.
   virtual void exchange(const Step<std::uint8_t>& step, Received& received) = 0;
+  /// Returns the clock rate in Hz that the port makes with its present settings.
+  [[nodiscard]] virtual std::uint32_t set_rate() const = 0;
   /// Switches to another clock rate, in Hz.
   virtual void change_rate(std::uint32_t rate) = 0;
 
@@ -46,6 +51,7 @@ class TransferPort : public Port<std::uint8_t> {
 
  private:
   LinkKind kind_;
+  std::uint32_t used_rate_ = 0;  // clock rate of the last transfer in Hz; 0: there was none
   Received received_{};
   Waiting<std::uint8_t> waiting_;
   bool sent_pending_ = false;      // whether the event `sent` is still to be reported

@@ -94,7 +94,7 @@ Link open_spi(const EncoderAddress& uri) {
   Link link;
   const auto port = std::make_shared<os::SpiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
   link.place = fmt::format("{} in SPI mode {}", uri.path, port->settings().spi_mode);
-  link.clock_rate = [controller = port.get()] { return controller->settings().rate; };
+  link.clock_rate = [controller = port.get()] { return controller->clock_rate(); };
   link.bytes = port.get();
   link.owner = port;
   return link;
@@ -104,7 +104,7 @@ Link open_ftdi(const EncoderAddress& uri) {
   Link link;
   const auto port = std::make_shared<os::FtdiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
   link.place = fmt::format("the {} with a clock of {} Hz", port->name(), port->settings().rate);
-  link.clock_rate = [chip = port.get()] { return chip->settings().rate; };
+  link.clock_rate = [chip = port.get()] { return chip->clock_rate(); };
   link.is_data_driven = [chip = port.get()] { return chip->look_at_data().driven; };
   link.bytes = port.get();
   link.owner = port;

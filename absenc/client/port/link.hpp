@@ -23,7 +23,7 @@ struct Link {
   std::string place;  // port in words, "/dev/ttyUSB0 at 2500000 baud"
   // looks whether something drives the data pin while the encoder is not clocked; null if the port cannot look
   std::function<bool()> is_data_driven{};
-  // returns the clock rate in Hz that the port makes now; null if the port makes no clock
+  // returns the clock rate in Hz of the last transfer; null if the port makes no clock
   std::function<std::uint32_t()> clock_rate{};
   std::vector<std::string> notes;  // hints for the user about the port, as on a setting that slows it
 };

@@ -162,7 +162,7 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// Returns the clock rate in Hz that the port makes; 0: it makes none.
+  /// Returns the clock rate in Hz of the last transfer; 0: the port makes no clock.
   [[nodiscard]] std::uint32_t clock_rate() const { return encoder_->clock_rate(); }
   /// Returns the resolution that the encoder has reported; before its first report, that of the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
