@@ -34,8 +34,9 @@ constexpr std::uint64_t megabyte = 1'000'000;
 }
 
 struct Cost {
-  double time;       // elapsed time in seconds
-  double processor;  // processor time of all threads and child processes, in seconds; it does not depend on other load
+  double time;  // elapsed time of the measured work, in seconds
+  // processor time of all threads and child processes, in seconds; unlike `time`, it is the same on a busy machine
+  double processor;
 };
 
 double processor_seconds() {
@@ -177,7 +178,8 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// Reads the same blocks as the decoder, only sums them up, and returns the time that this took.
+// Reads the blocks that the decoder reads, adds up their samples without decoding them, and returns the time that this
+// took.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;
@@ -191,7 +193,8 @@ Cost plain_read(const File& file) {
       }
     }
   });
-  if (sum == 1) std::puts("");  // uses the sum, which keeps the compiler from omitting its calculation
+  // prints depending on the sum of all samples, so that the compiler cannot omit its calculation
+  if (sum == 1) std::puts("");
   return cost;
 }
 
@@ -284,7 +287,7 @@ void compare_file_sizes(bool quick) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any argument selects the short run
+  const bool quick = argc > 1;  // a benchmark that is started with any argument makes only a short run
   static_cast<void>(argv);
   throughput(quick);
   two_threads(quick);

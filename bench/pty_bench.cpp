@@ -182,7 +182,7 @@ double median(std::vector<double> values) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any argument selects the short run
+  const bool quick = argc > 1;  // a benchmark that is started with any argument makes only a short run
   static_cast<void>(argv);
   constexpr int blocks = 40;
   const int exchanges = quick ? 500 : 3000;
@@ -198,7 +198,8 @@ int main(int argc, char** argv) {
   double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // Each measurement of the library is between two bare runs, which swap their roles in every round.
+    // Each run of the library is between two bare runs. One bare run is the reference, the other one shows the noise;
+    // in every round they swap these roles.
     const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
     const Block second = run(bare, exchanges);

@@ -18,7 +18,8 @@ void hide(Object& object) {
   asm volatile("" : : "r"(&object) : "memory");
 }
 
-/// Prints the usual table of results, then the ratios of the medians over all repetitions.
+/// Prints the table of results as Google Benchmark does, then for each pair the ratio of the two medians over all
+/// repetitions.
 class RatioReporter : public benchmark::ConsoleReporter {
  public:
   RatioReporter() : ConsoleReporter(isatty(STDOUT_FILENO) != 0 ? OO_ColorTabular : OO_Tabular) {}

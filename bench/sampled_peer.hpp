@@ -40,7 +40,7 @@ constexpr std::uint32_t every_byte = 0x0101'0101;
 
 inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
   std::uint32_t four = 0;
-  // compiled to a single load instruction, also in a freestanding program
+  // the compiler turns this copy of four bytes into a single load instruction, also in a freestanding program
   __builtin_memcpy(&four, samples, sizeof four);
   return four >> pin & every_byte;
 }

@@ -31,8 +31,8 @@ using namespace absenc::raa38;
 using namespace std::chrono_literals;
 
 constexpr std::array<std::size_t, 3> counts{1, 4, 16};
-constexpr std::uint32_t frames_each = 20'000;  // number of frames on each port: two seconds of a stream
-constexpr std::uint32_t together = 10;         // number of frames that are sent together, every millisecond
+constexpr std::uint32_t frames_each = 20'000;  // number of frames that are sent on each port, which takes two seconds
+constexpr std::uint32_t together = 10;         // number of frames that are sent at once, every millisecond
 constexpr int rounds = 3;
 
 [[noreturn]] void fail(const char* what) {

@@ -8,7 +8,8 @@ foreach(package IN LISTS CPACK_COMPONENTS_ALL)
     execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
   endif()
   set(documents "${root}/share/doc/${package}")
-  file(REMOVE "${documents}/LICENSE")  # the text of the licence is in /usr/share/common-licenses
+  # the package needs no copy of the licence, whose text is in /usr/share/common-licenses
+  file(REMOVE "${documents}/LICENSE")
   file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
        FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
   file(CHMOD_RECURSE "${root}" DIRECTORY_PERMISSIONS

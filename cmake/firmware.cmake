@@ -4,7 +4,7 @@
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
-# these flags follow those of the toolchain and override them
+# compiler flags of a Cortex-M4 with FPU; they stand behind those of the toolchain and override them
 set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)
 
 # For each machine: its sources in firmware/machine, and the start addresses of program and RAM.
@@ -53,7 +53,7 @@ add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector
                    COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
 set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
 
-# with the RISC-V compiler, which has a build tree of its own, only this program is built
+# for RISC-V, which has a build tree of its own, only the program that decodes all vectors is built
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)
   firmware_program(vectors-rv32 virt 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
   add_custom_target(firmware-all DEPENDS firmware_vectors-rv32)
@@ -70,8 +70,8 @@ target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-# drive and encoder are programs for the two ends of a T-format line; the other two have both ends of a line in one
-# program.
+# `drive` and `encoder` are programs for the two ends of a T-format line; each of the programs `cycles_...` contains
+# both ends of a line.
 foreach(program IN ITEMS drive encoder cycles_tformat cycles_biss)
   set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
   firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)
@@ -103,7 +103,7 @@ add_custom_target(firmware-readers)
 file(GLOB reader_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/firmware/readers/*.cpp")
 foreach(source IN LISTS reader_sources)
   cmake_path(GET source STEM reader)
-  string(REGEX REPLACE "_(known|carrier)$" "" unit "${reader}")
+  string(REGEX REPLACE "_(known|carrier|cyclic)$" "" unit "${reader}")
   string(REPLACE _ - unit "${unit}")
   foreach(cpu IN ITEMS m0plus m4f)
     firmware_program(reader-${reader}-${cpu} mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-${cpu}

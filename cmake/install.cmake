@@ -81,7 +81,7 @@ if(TARGET absenc-command)
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)
-  # creates this file as the user, who can then still write it after root has installed
+  # creates the manifest now, as the user, who can then still write it after root has installed
   file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")
   include(package)
 endif()

@@ -3,7 +3,7 @@
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME absenc)
 set(CPACK_PACKAGE_CONTACT "absenc developers <absenc@localhost.invalid>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # empty, because each package has its own description
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # no common description, because each package has its own
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PRE_BUILD_SCRIPTS "${PROJECT_SOURCE_DIR}/cmake/debian.cmake")

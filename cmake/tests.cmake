@@ -43,7 +43,7 @@ function(absenc_test_settings target)
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
 endfunction()
 
-# The path of the sources is defined only for this test, because it would make the compiler cache useless for others.
+# Only this test gets the path of the sources as a macro: with such a macro the compiler cache is useless.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
@@ -64,13 +64,13 @@ function(absenc_test name)
   add_dependencies(change-tests ${name}_test)
   absenc_test_settings(${name}_test)
   set_target_properties(${name}_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
-  # these are compiled with other settings than the precompiled headers, so they cannot use them
+  # these two tests are compiled with other settings than the precompiled headers, so they cannot use those headers
   if(name STREQUAL "command" OR name STREQUAL "manual")
     target_link_libraries(${name}_test PRIVATE absenc-command-objects $<TARGET_NAME_IF_EXISTS:absenc-${name}-objects>)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
-  # used by tests that compare tables in documents with the code
+  # the folder of the sources, for tests that compare tables in documents with the code
   set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
   set(long "${absenc_long_${name}_tests}")
@@ -144,7 +144,8 @@ if(TARGET absenc-client)
   if(NOT ABSENC_UNITS)  # this test is an executable of its own, because it replaces malloc
     absenc_test(reading_allocations tests/reading_allocations.cpp)
     target_link_libraries(reading_allocations_test PRIVATE absenc::client)
-    if(NOT ABSENC_SANITIZE AND NOT ABSENC_FUZZ)  # not with sanitizers, which replace malloc themselves
+    # does not count allocations with sanitizers and fuzzers, because these replace malloc themselves
+    if(NOT ABSENC_SANITIZE AND NOT ABSENC_FUZZ)
       target_compile_definitions(reading_allocations_test PRIVATE ABSENC_COUNTS_MALLOC)
     endif()
   endif()
@@ -198,7 +199,7 @@ if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
     endif()
     target_link_libraries(${target} PRIVATE fuzz_seeds_main absenc::absenc absenc::capture)
     add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
-    # such a test takes about a minute of processor time on an idle machine
+    # a test of fuzzer seeds takes about a minute of processor time on an idle machine
     set_tests_properties(fuzz_seeds.${stem} PROPERTIES LABELS long TIMEOUT 400)
   endforeach()
 endif()

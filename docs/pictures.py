@@ -28,7 +28,7 @@ def picture(name):
 
 def page(browser, folder):
     """The overview with one encoder lost and one with an alarm, and the page of one."""
-    # the page shows the path of this port
+    # the picture shows the path of this port, so it gets a plausible name
     emulator = Emulator(tempfile.gettempdir(), "--motion", "rpm=20", name="press-2")
     path, tokens = os.path.join(folder, "absenc.toml"), os.path.join(folder, "tokens")
     with open(path, "w", encoding="utf-8") as file:
@@ -49,7 +49,7 @@ def page(browser, folder):
             browser.window(width, height, dark)
             browser.go(server.url, **place)
             wait_until(lambda: browser.ask("return Boolean(document.querySelector('.spark .line[d], .plot canvas'))"), "it is drawn")
-            time.sleep(5)  # seconds in which the page draws live readings
+            time.sleep(5)  # waits 5 seconds, in which the page draws live readings
             browser.shot(picture(name))
     finally:
         end(server.process)

@@ -17,7 +17,7 @@ int main(int argc, char** argv) try {
       continue;
     }
     const Reading& reading = sample.reading;
-    if (!reading.singleturn_valid()) continue;  // not confirmed, or the encoder reports it as invalid
+    if (!reading.singleturn_valid()) continue;  // the position is not confirmed, or the encoder reports it as invalid
     std::printf("%.4f degrees\n", degrees(reading.singleturn, reading.singleturn_bits));
     const std::optional<client::Estimate> speed = sample.speed_rpm();
     if (speed) std::printf("%.1f rpm, within %.1f\n", speed->value, speed->uncertainty);

@@ -9,8 +9,8 @@ using namespace absenc;
 
 int main() {
   client::Emulation emulation = client::emulate("tformat?singleturn=65536");
-  client::Encoder encoder = client::open(emulation.address());  // in a real test, the drive under test opens
-                                                                // emulation.path()
+  // this example reads the virtual encoder itself; in a real test the drive opens the port emulation.path()
+  client::Encoder encoder = client::open(emulation.address());
   Reading reading = encoder.read();
   if (!reading.singleturn_valid() || reading.singleturn != 65536) return 1;
 

@@ -72,6 +72,16 @@ class Function:
             break
         raise Unknown(f"{self.name}: the stack changes by an unknown {register}")
 
+    def jump_table(self, address, index_of):
+        """Returns the targets in the table of addresses behind the jump at `address`."""
+        targets = []
+        at = (address + 7) & ~3  # the jump has 4 bytes, and words are aligned
+        while (target := self.words.get(at, 0) & ~1) in index_of:
+            targets.append(target)
+            at += 4
+        if not targets:
+            raise Unknown(f"{self.name}: a jump without a table behind it")
+        return targets
 
     def holds_return_address(self, index):
         """Returns whether the bx at `index` jumps to the return address: by lr, or a register popped before."""
@@ -111,8 +121,9 @@ class Graph:
         for site, target in calls:
             self.calls.setdefault(site, set()).add(target)
         self.depths = {}
-        self.indirect = {}  # for each function with indirect calls, the functions that it calls indirectly
-        self.never_called = set()  # functions with indirect calls that were not made in any measurement
+        # for each function that calls others by pointers, the functions that were called so in a measurement
+        self.indirect = {}
+        self.never_called = set()  # functions that call others by pointers, but did so in no measurement
 
     def find(self, pattern):
         return [one for one in self.functions.values() if re.search(pattern, one.name)]
@@ -173,6 +184,9 @@ class Graph:
                     targets = self.indirect_targets(function, address, index_of, waiting, after)
                 elif name == "ldr" and operands == "pc, [sp], #4":
                     goes_on = False
+                elif name == "ldr" and re.fullmatch(r"pc, \[\w+, \w+, lsl #2\]", operands):
+                    waiting += [(index_of[target], after) for target in function.jump_table(address, index_of)]
+                    goes_on = False
                 elif name in ("mov", "ldr", "add") and operands.startswith("pc,"):
                     raise Unknown(f"{function.name}: a jump by {name} {operands}")
                 elif name in ("pop", "ldmia", "ldm") and re.search(r"\bpc\b", operands):
@@ -181,7 +195,7 @@ class Graph:
                 if goes_on:
                     waiting.append((index + 1, after))
             missing = [index for index in range(len(function.code)) if index not in reached]
-            # An instruction that no other one leads to is taken as an entry of a jump table.
+            # An instruction to which no other instruction leads is taken as an entry of a jump table.
             if not missing or not table_depths:
                 return result
             waiting.append((missing[0], table_depths[-1]))

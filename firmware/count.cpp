@@ -69,35 +69,40 @@ unsigned branch() { return is_m4f ? 4 : 2; }
 // 0439), for memory without wait states and a multiplier that takes one cycle.
 unsigned cycles_of_short(unsigned code) {
   const auto registers = static_cast<unsigned>(std::popcount(code & 0xFF));
-  // instructions that load or store one register
+  // bit patterns of the instructions that load or store one register
   if (code >> 11 == 0b01001 || (code >= 0x5000 && code < 0xA000)) return 2;
-  if (code >> 9 == 0b1011010) return 1 + registers + (code >> 8 & 1);  // push instruction
-  if (code >> 8 == 0b10111101) return (is_m4f ? 5 : 4) + registers;    // pop instruction that returns from the function
-  // other pop instructions, and instructions that load or store several registers
+  if (code >> 9 == 0b1011010) return 1 + registers + (code >> 8 & 1);  // bit pattern of the instruction push
+  // bit pattern of a pop instruction that returns from the function
+  if (code >> 8 == 0b10111101) return (is_m4f ? 5 : 4) + registers;
+  // bit patterns of the other pop instructions, and of instructions that load or store several registers
   if (code >> 8 == 0b10111100 || code >> 12 == 0b1100) return 1 + registers;
-  if (code >> 12 == 0b1101 || code >> 11 == 0b11100) return branch();  // b instruction (branch)
-  if (code >> 8 == 0b01000111) return branch();                        // bx and blx instructions
-  // instructions that write the program counter
+  if (code >> 12 == 0b1101 || code >> 11 == 0b11100) return branch();  // bit patterns of the instruction b (branch)
+  if (code >> 8 == 0b01000111) return branch();                        // bit pattern of the instructions bx and blx
+  // bit patterns of the instructions that write the program counter
   if ((code >> 8 == 0b01000110 || code >> 8 == 0b01000100) && (code & 0x87) == 0x87) return branch();
-  if (code >> 12 == 0b1011 && (code >> 8 & 0b0101) == 0b0001) return branch();  // cbz and cbnz instructions
+  // bit pattern of the instructions cbz and cbnz
+  if (code >> 12 == 0b1011 && (code >> 8 & 0b0101) == 0b0001) return branch();
   return 1;
 }
 
 unsigned cycles_of_long(unsigned first, unsigned second) {
   const auto registers = static_cast<unsigned>(std::popcount(second & 0xFFFF));
-  // b and bl instructions; the same bits include barriers and mrs, which take 3 cycles
+  // bit pattern of the instructions b and bl; it includes barriers and mrs, which take 3 cycles
   if (first >> 11 == 0b11110 && (second >> 15) != 0) return is_m4f ? 4 : 3;
-  if (first >> 6 == 0b1110100010 || first >> 6 == 0b1110100100) {  // instructions that load or store several registers
+  // bit patterns of the instructions that load or store several registers
+  if (first >> 6 == 0b1110100010 || first >> 6 == 0b1110100100) {
     return 1 + registers + ((second >> 15) != 0 ? 3 : 0);
   }
-  // tbb and tbh instructions, and those that load or store two registers
+  // bit pattern of tbb, tbh and the instructions that load or store two registers
   if (first >> 9 == 0b1110100) return (first & 0xFFF0) == 0xE8D0 ? 6 : 3;
-  // instructions that load (perhaps the program counter) or store
+  // bit pattern of the instructions that load a register (perhaps the program counter) or store one
   if (first >> 9 == 0b1111100) return second >> 12 == 15 && (first & 0x10) != 0 ? 5 : 2;
-  if (first >> 4 == 0xFB9 || first >> 4 == 0xFBB) return 12;  // division instructions
-  if (first >> 9 == 0b1110110) return 1 + (second & 0xFF);    // load and store instructions of the FPU
-  if (first >> 8 == 0b11101110) return 14;                    // arithmetic instructions of the FPU
-  return first >> 5 == 0b11111011101 ? 2 : 1;                 // long multiplication instructions
+  if (first >> 4 == 0xFB9 || first >> 4 == 0xFBB) return 12;  // bit patterns of the division instructions
+  // bit pattern of the load and store instructions of the FPU
+  if (first >> 9 == 0b1110110) return 1 + (second & 0xFF);
+  if (first >> 8 == 0b11101110) return 14;  // bit pattern of the arithmetic instructions of the FPU
+  // bit pattern of the multiplications with a result of 64 bits
+  return first >> 5 == 0b11111011101 ? 2 : 1;
 }
 
 void execute(unsigned, void* data) {
@@ -144,7 +149,7 @@ void translate(Instruction* instruction) {
   std::uint16_t code[2]{};
   std::memcpy(code, qemu_plugin_insn_data(instruction), qemu_plugin_insn_size(instruction));
   const bool is_long = qemu_plugin_insn_size(instruction) == 4;
-  // bx or blx instruction whose target is not in the link register
+  // the instruction is bx or blx, and its target is not in the link register
   const bool calls_register = !is_long && code[0] >> 8 == 0x47 && (code[0] >> 3 & 15) != 14;
   Executed& one = executed[address];
   one = {address, is_long ? cycles_of_long(code[0], code[1]) : cycles_of_short(code[0]), calls_register};

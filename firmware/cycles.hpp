@@ -67,7 +67,7 @@ class AcceleratingShaft final : public Shaft {
   static constexpr std::int64_t start = (std::int64_t{1000} << 32) + (std::int64_t{1} << 30);
   // Returns the way 50 revolutions/s^2 * t^2 in 2^-32 revolution. The time t is `ns`, from -1 s to 1 s, in nanoseconds.
   [[nodiscard]] static constexpr std::int64_t curve(std::int64_t ns) {
-    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42, rounded
+    constexpr std::int64_t factor = 944'473;  // 50 revolutions/s^2 in 2^-32 revolution per ns^2, times 2^42, rounded
     return (ns * ns >> 20) * factor >> 22;
   }
 };
@@ -76,23 +76,28 @@ class AcceleratingShaft final : public Shaft {
 class CycleCheck {
  public:
   /// Makes a check. `jitter`: greatest time by which the machine may note the time of an event too late.
-  explicit CycleCheck(Time jitter) : jitter_(jitter) {}
+  /// `compares_speed`: whether the drive also refuses positions that the speed of its last two readings contradicts; it
+  /// needs that where single wrong bits may pass the check of the frame.
+  CycleCheck(Time jitter, bool compares_speed) : jitter_(jitter), compares_speed_(compares_speed) {}
 
   void take(const host::Cycle& cycle, Time next) {
     ++counts_[static_cast<std::size_t>(cycle.kind)];
     longest_stale_ = std::max(longest_stale_, cycle.stale);
     if (cycle.kind != host::Cycle::Kind::fresh) return;
     const Reading& reading = cycle.reading;
-    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached.
-    if (!first_.confirms(reading)) {
+    // A damaged reply may pass its checksum, so the drive refuses a position that the shaft cannot have reached: by the
+    // speed limit, and by the speed of the last two readings.
+    if (!first_.confirms(reading) || (compares_speed_ && !continues(reading))) {
       ++implausible_;
       return;
     }
+    if (reading.alarms != 0) ++alarmed_;
     if (!is_near(counts_of(reading), reading, reading.latched, 1, 1)) ++wrong_;
-    // between readings that are further apart than this, the check does not extrapolate
-    constexpr Time longest_gap = 500us;
     if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
+    span_ = reading.latched - latched_;
     latched_ = reading.latched;
+    step_ = distance(position_, counts_of(reading), reading.singleturn_bits + reading.multiturn_bits);
+    position_ = counts_of(reading);
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
     if (extrapolation_.bits() != reading.singleturn_bits + reading.multiturn_bits) return;
@@ -107,16 +112,40 @@ class CycleCheck {
     for (std::size_t i = 0; i < names.size(); ++i) print_count(names[i], counts_[i]);
     print_count("longest_stale", longest_stale_);
     print_count("implausible", implausible_);
+    print_count("alarmed", alarmed_);
     print_count("wrong", wrong_);
     print_count("far", far_);
   }
 
  private:
+  // Between readings that are further apart than this, the drive does not extrapolate.
+  static constexpr Time longest_gap = 500us;
+
+  // Returns whether the position is where the last two readings lead, with a tolerance for their errors: a count each,
+  // and the motion within the jitter of their times. Both grow with the extrapolated time.
+  [[nodiscard]] bool continues(const Reading& reading) const {
+    const Time gap = reading.latched - latched_;
+    if (!extrapolation_.valid() || gap > longest_gap) return true;
+    const unsigned bits = extrapolation_.bits();
+    if (bits != reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0)) return true;
+    // Numbers of 32 bits, because a processor without division is slow with 64.
+    const auto gap_ns = static_cast<std::uint32_t>(gap.count());
+    const auto span_ns = static_cast<std::uint32_t>(span_.count());
+    constexpr std::uint32_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
+    const std::uint32_t error = 1 + step_ * (static_cast<std::uint32_t>(jitter_.count()) / 100) / (span_ns / 100);
+    const std::uint32_t allowed = by_acceleration + 2 * error * (1 + gap_ns / span_ns);
+    return distance(extrapolation_.at(reading.latched), counts_of(reading), bits) <= allowed;
+  }
+  // Returns the distance in counts between two positions of `bits` bits, at most 100 000.
+  [[nodiscard]] static std::uint32_t distance(std::uint64_t from, std::uint64_t to, unsigned bits) {
+    const std::int64_t counts = with_sign(to - from, bits);
+    return static_cast<std::uint32_t>(std::min<std::int64_t>(counts < 0 ? -counts : counts, 100'000));
+  }
   [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
     return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
   }
-  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time within `jitters`
-  // jitters of `time`.
+  // Returns whether the shaft was at `position`, with a tolerance of `counts` counts, at some time that differs from
+  // `time` by at most `jitters` times the jitter.
   [[nodiscard]] bool is_near(std::uint64_t position, const Reading& reading, Time time, std::int64_t counts,
                              int jitters) const {
     const unsigned bits = reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
@@ -130,14 +159,21 @@ class CycleCheck {
   }
 
   Time jitter_;
+  bool compares_speed_;
   host::Extrapolation extrapolation_{};
-  Time latched_{};  // latch time of the last fresh reading
+  Time latched_{};              // time at which the last new and plausible reading was latched
+  Time span_{};                 // time between the latches of the last two such readings
+  std::uint64_t position_ = 0;  // position of the last such reading
+  std::uint32_t step_ = 0;      // distance of the positions of the last two such readings, in counts
   std::array<std::uint32_t, 4> counts_{};
   host::FirstReading first_{6000};
   std::uint32_t longest_stale_ = 0;
-  std::uint32_t implausible_ = 0;  // number of fresh cycles whose position is too far from the previous one
+  // number of new readings whose position the shaft cannot have reached since the readings before
+  std::uint32_t implausible_ = 0;
+  std::uint32_t alarmed_ = 0;  // number of good positions with an alarm
   std::uint32_t wrong_ = 0;
-  std::uint32_t far_ = 0;  // number of extrapolated positions that are too far from the shaft
+  // number of extrapolated positions that are farther from the true position of the shaft than allowed
+  std::uint32_t far_ = 0;
 };
 
 /// Handles the events of the line that are due, in the order of time, and sets the alarm of the timer to the next one.
@@ -193,15 +229,17 @@ class ServiceRunner {
   alignas(std::max_align_t) std::array<std::byte, 3072> storage_;
 };
 
-/// The differences between the programs cycles_tformat and cycles_biss.
+/// The values in which the programs cycles_tformat and cycles_biss differ.
 struct Plan {
+  Time period{};                   ///< time from one cycle to the next
   std::string_view temperature{};  ///< command that is run every second; "": none
-  std::uint32_t alarm = 0;         ///< alarm that the encoder raises in each rest of the shaft; 0: none
-  std::string_view clear{};        ///< command that clears the alarm; "": no command is run
+  std::uint32_t alarm = 0;         ///< alarm that the encoder raises once in each motion of the shaft
+  std::string_view clear{};        ///< command that clears the alarm; "": the encoder itself ends it after 100 ms
   std::int64_t page = 0;           ///< page of the encoder's memory that is written and read
   std::int64_t addresses = 0;      ///< number of addresses on each page of the memory
   std::int64_t bytes = 0;          ///< number of bytes of the encoder's memory that are written and read
-  bool takes_cycles = false;       ///< whether commands may take cycles, in which no position is read
+  /// whether a command may use a cycle for itself, so that this cycle reads no position
+  bool takes_cycles = false;
 };
 
 /// Runs commands until `cycles` cycles are over. `Bench` has the members `axis()`, which is the CyclicHost, `device()`
@@ -214,7 +252,9 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
   std::uint32_t temperatures = 0;
   std::uint32_t cleared = 0;
   Time second = 1s;
-  Time alarm_at = AcceleratingShaft::begin_of_rest + 100ms;
+  // An alarm that a command clears is raised while the shaft rests, because the encoder refuses the command otherwise.
+  Time alarm_at = (plan.clear.empty() ? Time{} : AcceleratingShaft::begin_of_rest) + 100ms;
+  Time alarm_ends = never;
   const auto is_running = [&] {
     const machine::InterruptLock lock;
     return bench.check().all() < cycles;
@@ -229,14 +269,21 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
       second += 1s;
       if (run(plan.temperature, {})) ++temperatures;
     }
-    if (plan.alarm == 0 || machine::now() < alarm_at) return;
+    if (machine::now() >= alarm_ends) {
+      alarm_ends = never;
+      const machine::InterruptLock lock;
+      bench.device().lower_alarms(plan.alarm);
+    }
+    if (machine::now() < alarm_at) return;
     alarm_at += AcceleratingShaft::period;
     {
       const machine::InterruptLock lock;
       bench.device().raise_alarms(plan.alarm);
     }
-    if (!plan.clear.empty()) {
-      if (run(plan.clear, {})) ++cleared;
+    if (plan.clear.empty()) {
+      alarm_ends = machine::now() + 100ms;
+    } else if (run(plan.clear, {})) {
+      ++cleared;
     }
   };
   for (std::int64_t i = 0; is_running(); ++i) {
@@ -248,7 +295,7 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     const std::int64_t address = i % plan.addresses;
     const std::int64_t page = plan.page + i / plan.addresses;
     const std::int64_t value = (i * 37 + 11) & 0xFF;
-    const std::array<std::int64_t, 4> write{address, value, page, 0};
+    const std::array<std::int64_t, 4> write{address, value, page, 1};  // BiSS writes most banks only if forced: 1
     const std::array<std::int64_t, 3> read{address, page, 1};
     const std::size_t write_count = find_command(bench.unit(), "memory-write")->arguments.size();
     // If a damaged reply ends a command, the command is run again: writing the same byte twice does no harm.
@@ -260,6 +307,8 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     }
   }
   const machine::InterruptLock lock;
+  // The first cycle begins after one period, and each cycle has its result, which may come in the next one.
+  const std::int64_t left_out = machine::now() / plan.period - bench.check().all();
   bench.check().print_counts();
   print_count("bytes", written);
   print_count("temperatures", temperatures);
@@ -268,7 +317,29 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
   print_count("faults", bench.faults());
   print_count("rules", bench.device().violation_count());
   print_count("stack", machine::stack_used());
-  return bench.check().is_right() && bench.device().violation_count() == 0;
+  print_count("left_out", static_cast<std::uint64_t>(std::max<std::int64_t>(left_out - 2, 0)));
+  return bench.check().is_right() && bench.device().violation_count() == 0 && left_out <= 2;
+}
+
+/// Bench of the program, which `on_alarm` uses.
+template <class Bench>
+inline Bench* bench = nullptr;
+
+/// Makes a Bench for an encoder of `model` with `settings`, runs it with the commands of `plan`, and ends the program.
+template <class Bench>
+[[noreturn]] void run_program(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                              const Plan& plan) {
+  static Options options;
+  if (resolve_options(unit, model, settings, options).kind != OptionError::Kind::none) machine::end(false);
+  machine::start_clock(500ms);
+  alignas(Bench) static std::array<std::byte, sizeof(Bench)> memory;
+  bench<Bench> = new (memory.data()) Bench(options, machine::now());
+  {
+    const machine::InterruptLock lock;
+    run_line(*bench<Bench>);
+  }
+  static ServiceRunner command(unit, options);
+  machine::end(run_commands(*bench<Bench>, command, plan, machine::argument(0, 100'000)));
 }
 
 }  // namespace absenc::firmware

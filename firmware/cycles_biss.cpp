@@ -25,7 +25,8 @@ class Bench {
  public:
   Bench(const Options& options, Time begin)
       : device_(*biss::unit.device(options, shaft_, device_memory_).bytes),
-        axis_(read_, {.period = period, .line = biss::line_settings, .carried = biss::unit.services_carry_position},
+        axis_(read_,
+              {.period = firmware::period, .line = biss::line_settings, .carried = biss::unit.services_carry_position},
               begin + period),
         drive_(drive_end_) {
     device_.power_on(begin, Device<std::uint8_t>::PowerOn::skip);
@@ -101,35 +102,18 @@ class Bench {
   Time end_ = never;
   Random random_{};
   std::uint32_t faults_ = 0;
-  CycleCheck check_{1us};
+  CycleCheck check_{1us, true};
 };
-
-alignas(Bench) std::byte bench_memory[sizeof(Bench)];
-Bench* bench = nullptr;
 
 }  // namespace
 }  // namespace absenc::firmware
 
-namespace absenc::machine {
-void on_tick() {}
-void on_received(std::uint8_t) {}
-void on_sent() {}
-void on_alarm() { firmware::run_line(*firmware::bench); }
-}  // namespace absenc::machine
+void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware::Bench>); }
 
 int main() {
   using namespace absenc;
-  using namespace absenc::firmware;
-  static Options options;
   constexpr std::array<OptionText, 3> settings{{{"ma_khz", "5000"}, {"adaptive_timeout", "true"}, {"latency_us", "1"}}};
-  if (resolve_options(biss::unit, {}, settings, options).kind != OptionError::Kind::none) machine::end(false);
-  machine::start_clock(500ms);
-  bench = new (bench_memory) Bench(options, machine::now());
-  {
-    const machine::InterruptLock lock;
-    run_line(*bench);
-  }
-  static ServiceRunner command(biss::unit, options);
-  const std::uint32_t cycles = machine::argument(0, 100'000);
-  machine::end(run_commands(*bench, command, {.page = 0, .addresses = 64, .bytes = 64}, cycles));
+  firmware::run_program<firmware::Bench>(
+      biss::unit, {}, settings,
+      {.period = firmware::period, .alarm = word_warning, .page = 0, .addresses = 64, .bytes = 256});
 }

@@ -25,7 +25,7 @@ class Bench {
  public:
   Bench(const Options& options, Time begin)
       : device_(*tformat::unit.device(options, shaft_, device_memory_).bytes),
-        axis_(read_, {.period = period, .line = tformat::line_settings, .answer = 12us, .latency = latency},
+        axis_(read_, {.period = firmware::period, .line = tformat::line_settings, .answer = 12us, .latency = latency},
               begin + period),
         drive_(drive_end_, latency),
         encoder_(encoder_end_) {
@@ -129,46 +129,27 @@ class Bench {
   Block request_{};
   Block reply_{};
   bool is_silent_ = false;
-  bool is_disturbed_ = false;  // drive and encoder have sent at the same time
+  bool is_disturbed_ = false;  // whether drive and encoder have sent at the same time, which destroys the bytes of both
   Time now_{};
   Random random_{};
   std::uint32_t faults_ = 0;
-  CycleCheck check_{5us};
+  CycleCheck check_{5us, false};
 };
-
-alignas(Bench) std::byte bench_memory[sizeof(Bench)];
-Bench* bench = nullptr;
 
 }  // namespace
 }  // namespace absenc::firmware
 
-namespace absenc::machine {
-void on_tick() {}
-void on_received(std::uint8_t) {}
-void on_sent() {}
-void on_alarm() { firmware::run_line(*firmware::bench); }
-}  // namespace absenc::machine
+void absenc::machine::on_alarm() { firmware::run_line(*firmware::bench<firmware::Bench>); }
 
 int main() {
   using namespace absenc;
-  using namespace absenc::firmware;
-  static Options options;
-  if (resolve_options(tformat::unit, "TS5700N8500", {}, options).kind != OptionError::Kind::none) machine::end(false);
-  machine::start_clock(500ms);
-  bench = new (bench_memory) Bench(options, machine::now());
-  {
-    const machine::InterruptLock lock;
-    run_line(*bench);
-  }
-  static ServiceRunner command(tformat::unit, options);
-  const std::uint32_t cycles = machine::argument(0, 100'000);
-  machine::end(run_commands(*bench, command,
-                            {.temperature = "temperature",
-                             .alarm = tformat::alarms::over_heat,
-                             .clear = "clear-alarms",
-                             .page = 2,
-                             .addresses = 127,
-                             .bytes = 256,
-                             .takes_cycles = true},
-                            cycles));
+  firmware::run_program<firmware::Bench>(tformat::unit, "TS5700N8500", {},
+                                         {.period = firmware::period,
+                                          .temperature = "temperature",
+                                          .alarm = tformat::alarms::over_heat,
+                                          .clear = "clear-alarms",
+                                          .page = 2,
+                                          .addresses = 127,
+                                          .bytes = 256,
+                                          .takes_cycles = true});
 }

@@ -146,14 +146,14 @@ class ReadingCheck {
   std::uint32_t singleturn_;
   std::uint32_t multiturn_;
   std::uint32_t alarms_ = 0;
-  bool known_ = false;  // true: the last reading was plausible, so the next one must be near it
+  bool known_ = false;  // whether the last reading was plausible; then the position of the next reading must be near it
   std::uint32_t good_ = 0;
   std::uint32_t failed_ = 0;
   std::uint32_t implausible_ = 0;
   std::uint32_t wrong_ = 0;
 };
 
-// Checks the next result if there is one; otherwise waits for an interrupt.
+// Checks the result of the next cycle if there is one; otherwise waits for an interrupt.
 void take_one(ReadingCheck& check) {
   Result result;
   if (axis->take(result)) {

@@ -5,7 +5,7 @@ Writes the vectors as tables for firmware/vectors.cpp."""
 import json
 import sys
 
-# the vectors of these units contain frames as text
+# units whose reference vectors contain frames as text, not as bytes
 TEXT_LINKS = {"biss", "biss-safety", "biss-chain", "ssi", "raa38-can"}
 SAME_UNIT = {"biss-control": "biss", "biss-control-request": "biss"}
 
@@ -15,7 +15,7 @@ def option_text(value):
 
 
 def options_of(vector):
-    # the options in such a vector describe the vector itself, not the format of its frame
+    # the options of vectors with BiSS control frames are no options of the unit `biss`
     if vector["protocol"] in SAME_UNIT:
         return {}
     options = {name: value for name, value in vector["options"].items() if name != "configuration"}
@@ -97,4 +97,5 @@ def main():
         file.write("std::span<const ReferenceVector> reference_vectors() { return vectors; }\n}\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

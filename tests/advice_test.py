@@ -44,7 +44,7 @@ class NamedCommands(unittest.TestCase):
                 continue
             verb = tuple(words[1:3] if words[1] in TWO_WORDS else words[1:2])
             if not re.fullmatch(r"[a-z-]+", verb[0]) or verb[0].startswith("-"):
-                # the quoted command is not run: behind `absenc` stands an option, or a placeholder for the verb
+                # A quoted command is not run if an option or a placeholder stands behind `absenc` instead of a verb.
                 continue
             verbs.setdefault(verb, f"{source}: `{quoted}`")
         self.assertGreater(len(verbs), 15)

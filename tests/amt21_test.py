@@ -31,7 +31,7 @@ class Turns(Case):
         absenc("record", BACKWARDS, "--output", file, "--count", "2")
         with open(file, encoding="utf-8") as lines:
             rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-        # Rows for gaps are left out, because a busy machine may cause gaps.
+        # Rows that mark gaps between readings are left out, because a busy machine may cause gaps.
         readings = [row for row in rows if row["event"] != "gap"]
         self.assertEqual([row["multiturn"] for row in readings], ["-3", "-3"])
         self.assertEqual(int(rows[0]["position"]), -3 * 16384 + int(rows[0]["singleturn"]))

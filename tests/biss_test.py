@@ -418,7 +418,7 @@ class LifeCounter(Case):
                 self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
                 self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
                 self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
-                # The frame after a damaged one may have any counter except that of the last good frame.
+                # The frame after a damaged one may have any life counter except that of the last good frame.
                 damaged = of([1, 2, 3, 5])
                 damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
                 self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])
@@ -483,7 +483,8 @@ class StartSequence(Case):
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
         self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
                          [(41, False), (2, False), (41, True), (41, True)])
-        # The clock rests for 40 us between two frames; the data line is sampled half a clock period after an edge.
+        # The clock rests for 40 us between two frames; another 0.5 us, half a clock period, pass from the first clock
+        # edge of a frame to its first sample.
         for before, after in zip(rows[:2], rows[1:]):
             self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
 
@@ -586,7 +587,8 @@ class ControlFrames(Case):
             fields = answer["fields"]
             self.assertEqual((fields["operation"], fields["slave_id"], fields["address"], fields["data"]),
                              ("write" if write else "read", slave, address, data.hex()))
-            # the field start_delay shows all delays of a shorter frame; of a long one, it shows at least 48
+            # the field start_delay lists the delays before the data bytes: all of them, or at least the first 48 of
+            # more
             reported = numbers(fields["start_delay"])
             self.assertEqual(reported, delays[:max(48, len(reported))])
             self.assertTrue(fields["next_address_accepted"])

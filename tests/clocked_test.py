@@ -38,7 +38,7 @@ class VirtualClockedEncoder(Case):
                 self.assert_good(absenc("record", encoder, "--output", file, "--count", "5"))
                 with open(file, encoding="utf-8") as rows:
                     lines = [line for line in rows if not line.startswith("#")]
-                # Rows for gaps are left out, because a busy machine may cause gaps.
+                # Rows that mark gaps between readings are left out, because a busy machine may cause gaps.
                 taken = [row["singleturn"] for row in csv.DictReader(lines) if row["event"] != "gap"]
                 self.assertEqual(taken, [str(singleturn)] * 5)
 

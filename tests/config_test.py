@@ -102,8 +102,8 @@ class Overriding(ConfigCase):
         self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
         self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
         self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
-        # A setting of a bus or an encoder must suit protocol and port. A setting in [defaults] need not suit every
-        # encoder.
+        # A setting of a bus or an encoder must suit its protocol and port; a setting in [defaults] may be unsuitable
+        # for some encoders.
         self.config(SIM + "latency = 5\n")
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
 

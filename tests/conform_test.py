@@ -24,8 +24,8 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The clause bad-delimiter is not tested on this kind of port: the reply arrives before the port is back
-            # at its own rate.
+            # The clause bad-delimiter is not tested on this kind of port: for a bad delimiter the port changes its baud
+            # rate, and the reply arrives before the port is back at the usual rate.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)

@@ -21,18 +21,19 @@ WEAK_CHECK = {"amt21"}
 
 # A finding that doctor may also report as the cause of damaged frames, by protocol and fault.
 ALSO = {
-    # If a byte 00 of channel 2, which the checksum does not cover, is lost, the settings look wrong.
+    # If a line of EncoLink loses a byte 00 of channel 2, which the checksum does not cover, the settings of the host
+    # look wrong.
     ("encolink", "NUL lost"): "wrong_settings",
     # A late reply to the command `v` may arrive just before the next reply, which then seems to have extra bytes.
     ("e201", "randomly late"): "extra_bytes",
 }
 
-# Each row: name, fault of the line, ids of the findings that doctor may report first. The id "good": doctor finds no
-# fault.
+# Each row: name, fault of the line, ids of the findings that doctor may report first. The id "good" means that doctor
+# finds no fault.
 PROXIED = [
     ("healthy", faults.Fault, "good"),
     ("split in packets", faults.Split, "good"),
-    # wrong_echo is reported on a line with four wires, where no echo is expected
+    # the finding wrong_echo is right on a line with four wires, where no echo is expected
     ("own echo", faults.Echo, "good wrong_echo"),
     ("dead", faults.Dead, "no_answer"),
     ("line low", faults.LineLow, "line_inverted"),
@@ -42,7 +43,7 @@ PROXIED = [
     ("NMEA", faults.Nmea, "modem_answers never_silent"),
     ("chatter", faults.Chatter, "never_silent"),
     ("always late", faults.AlwaysLate, "reply_late"),
-    # sometimes_silent is also right: a late reply may arrive after the host has stopped listening for it.
+    # The finding sometimes_silent is also right: a late reply may arrive after the host has stopped listening for it.
     ("randomly late", faults.SometimesLate, "sometimes_late reply_late sometimes_silent"),
     ("loose contact", faults.LooseContact, "comes_and_goes sometimes_silent"),
     ("starting", faults.Starting, "good starting"),

@@ -14,7 +14,7 @@ from command_support import ABSENC, BabblingLine, Emulator, EncoderCase, FakeEnc
 PATIENT = "latency=300"  # latency in milliseconds, for a machine that is busy with other tests
 
 
-# Reply to the request 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
+# Reply of a T-format encoder to the request 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
 GOOD_REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
 

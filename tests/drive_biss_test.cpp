@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the BiSS drive of docs/drive.md with a virtual encoder at the other end of the line.
+// Tests the program of docs/drive.md for a drive with a BiSS encoder; a virtual encoder is at the other end of the
+// line.
 #include "firmware/hookup/drive_biss.cpp"
 
 #include <gtest/gtest.h>
@@ -66,7 +67,7 @@ TEST(DriveGuide, RegisterAccessRidesInCycles) {
   ASSERT_NE(service, nullptr);
   int cycles = 0;
   for (; !service->is_over() && cycles < 1000; ++cycles) {
-    run_until(time_now + 50us);
+    run_until(time_now + Axis::period);
     ASSERT_EQ(axis.last.kind, host::Cycle::Kind::fresh) << "the access cost cycle " << cycles;
     const std::int64_t truth = motion.at(axis.last.reading.latched).position >> 13 & 0x7FFFF;
     EXPECT_LE(std::abs(wrapped_difference(axis.last.reading.singleturn, static_cast<std::uint64_t>(truth), 19)), 60);

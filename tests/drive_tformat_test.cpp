@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the T-format drive of docs/drive.md with a virtual encoder at the other end of the line.
+// Tests the program of docs/drive.md for a drive with a T-format encoder; a virtual encoder is at the other end of the
+// line.
 #include "firmware/hookup/drive_tformat.cpp"
 
 #include <gtest/gtest.h>
@@ -73,7 +74,7 @@ namespace {
 
 TEST(DriveGuide, ElectricalAngleFollowsShaftAndMissingRepliesStopTheDrive) {
   sim::Motion motion = sim::Motion::constant_speed(std::int64_t{5} << 32, 3000);
-  // the shaft stands still at first, because an encoder that is switched on while it turns has no valid position
+  // the shaft stands still at first, because an encoder that is switched on while its shaft turns has no valid position
   motion.begin_at(5ms);
   tformat::VirtualEncoder device(Axis::format, motion);
   device.power_on(time_now, Device<std::uint8_t>::PowerOn::skip);
@@ -87,8 +88,8 @@ TEST(DriveGuide, ElectricalAngleFollowsShaftAndMissingRepliesStopTheDrive) {
     const auto found = static_cast<std::int32_t>(
         control_cycle(instant) -
         (static_cast<std::uint32_t>(motion.at(instant).position) * Axis::pole_pairs + Axis::offset));
-    // The limit is four counts of the encoder: two counts, and two for the rounding of the speed over one and a half
-    // cycles.
+    // The limit of the error of the electrical angle is four counts of the encoder: two of the position, and two
+    // because the rounded speed extrapolates it over one and a half cycles.
     EXPECT_LT(std::abs(found), 4 * static_cast<int>(Axis::pole_pairs) * (1 << (32 - Axis::format.singleturn_bits)))
         << i;
   }

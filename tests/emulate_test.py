@@ -23,7 +23,7 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, read_
 REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6, 0xD: 4}
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
-# bits of the status field SF: counting error, and the bit that is set if any alarm is raised
+# bits of the status field SF of a T-format reply: counting error, and the bit that is set if any alarm is raised
 COUNTING_ERROR, ALARM = 0x10, 0x20
 
 
@@ -736,7 +736,7 @@ class Lifecycle(EmulateCase):
         with Client.open(emulator.path) as client:
             client.send([0xEA, 0x05, 0xEF])
             client.receive(11, 0.2)
-        # each of the three damaged bytes counts as a fault, as the help states
+        # each of the three damaged bytes of the request counts as one fault, as the help of `emulate` states
         self.assertIn("3 request_corrupt", emulator.end()[2])
 
     def test_reports_violations(self):
@@ -870,7 +870,8 @@ class MemoryFile(EmulateCase):
         with Client.open(emulator.path) as client:
             shutil.rmtree(self.file("sub"))
             client.send(bytes.fromhex("32 05 5a 6d"))
-            self.assertEqual(client.receive(4), b"")  # the emulator ends without a reply
+            # there is no reply: the emulator ends, because it cannot save the written byte
+            self.assertEqual(client.receive(4), b"")
         self.assertEqual(emulator.process.wait(PATIENCE), 1)
         self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 

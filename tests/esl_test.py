@@ -102,7 +102,7 @@ class VirtualEncoder(EslCase):
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
         self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
         self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
-        # The status fields are compared without their error bits.
+        # The status fields of both channels are compared with the expected value, except for their error bits.
         self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))
         self.assertEqual((one[2], two[2]), (alarms, alarms))
         self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)

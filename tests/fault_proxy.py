@@ -60,7 +60,7 @@ class FaultProxy(FakeLine):
             os.write(self.encoder, data)
 
     def serve(self):
-        due = []  # heap of (time to send, number, bytes) for the host
+        due = []  # heap of bytes to send to the host: (time to send, number that keeps the order, bytes)
         number = 0
         gathered = b""
         gathered_at = None
@@ -107,7 +107,7 @@ class FaultProxy(FakeLine):
                 self.to_host(data)
 
 
-# ---- No encoder, or another device in its place
+# ---- Faults: no encoder on the line, or another device in its place
 
 
 class Dead(Fault):
@@ -160,7 +160,7 @@ class Chatter(Fault):
     chatter = (0.002, b"\x55\x12")
 
 
-# ---- Timing
+# ---- Faults: late replies, and times without replies
 
 
 class AlwaysLate(Fault):
@@ -216,7 +216,7 @@ class Starting(Fault):
         return data if now >= self.ready else b""
 
 
-# ---- Lost or damaged bytes
+# ---- Faults: bytes lost or damaged on the line
 
 
 class Lost(Fault):
@@ -333,7 +333,7 @@ class OneBehind(Fault):
         self.last = data
 
 
-# ---- Changes of bytes by adapters and drivers
+# ---- Faults: bytes changed by adapters and drivers
 
 
 class Echo(Fault):

@@ -60,7 +60,7 @@ class FirstMinutes(Case):
             self.assert_failed(result, "which encoder is on", "nothing came back")
 
     def test_doctor_reports_uncertain_protocol(self):
-        # The shaft stands still, so all frames are equal: this may be chance and is little evidence.
+        # The shaft stands still, so all frames are equal: they may fit the protocol by chance.
         with Emulator(self.directory, protocol="raa38") as emulator:
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "It may be raa38", "may be chance")

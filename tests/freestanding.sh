@@ -14,7 +14,7 @@ allowed=(
   '__aeabi_[a-z0-9_]+'
   '__gnu_thumb1_case_[a-z]+'
   '__[a-z]+[sd]i[23]'  # functions of libgcc, such as __popcountsi2 and __clzdi2
-  __cxa_pure_virtual   # is in the virtual table of every abstract class, and never called
+  __cxa_pure_virtual   # stands for pure virtual functions in the virtual table of every abstract class; never called
 )
 pattern=$(IFS='|'; echo "^(${allowed[*]})\$")
 

@@ -21,9 +21,10 @@ VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.
 GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-# Expected output of the example: it prints the speed as soon as enough positions for an average were read.
+# Expected output of read_by_name: it prints positions, then the speed, as soon as enough positions for an average were
+# read.
 BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"
-# A program like firmware, with a virtual encoder whose shaft is at 7.25 turns.
+# A program that uses the library as firmware does. It reads a virtual encoder whose shaft is at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
 #include <cstdio>

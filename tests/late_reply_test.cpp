@@ -65,7 +65,7 @@ class DelayedSession {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// Runs one command that reports a position. With `confirmed`, a reading that is not confirmed does not count.
+  /// Runs one command that reports a position. With `confirmed`, a reading counts only if another has confirmed it.
   void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
@@ -80,8 +80,8 @@ class DelayedSession {
     if (age > 3ms) ++outcomes.stale;
   }
 
-  /// Returns how wrong the timestamp of the reading is, computed from the shaft's position, beyond the time of one
-  /// count; 0 if less.
+  /// Returns by how much the timestamp of the reading differs from the time at which the shaft was at the position
+  /// read, minus the time in which the shaft turns by one count; 0 if negative.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
@@ -265,7 +265,8 @@ TEST_P(LateReply, ReadingsResumeSoonAfterStall) {
                 only_first_arrives ? "one reply " : "all of them", outcomes.good, outcomes.failed, outcomes.stale,
                 static_cast<double>(silence.count()) / 1e9);
     EXPECT_EQ(outcomes.stale, 0u);
-    // The longest silence is limited only if just one delayed reply arrives and the others are lost, and not on CAN.
+    // The longest time between two good readings is limited only if a stalled line delivers one delayed reply and loses
+    // the others, and not on CAN.
     if (only_first_arrives && !is_on_can(kind)) {
       EXPECT_LT(silence, 3s);
     }

@@ -13,7 +13,8 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # Each value: unit, options, number of bytes of a position request, and of its reply; None: not checked
+# Each value: unit, options, size of a position request in bytes, size of its reply in bytes; None: size not checked
+ENCODERS = {
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),
@@ -31,7 +32,7 @@ class DelayingRelay(threading.Thread):
         self.requests = 0  # number of requests (bursts of bytes) received from the host so far
         # replies sent to the host: (number of the request, number of requests received by then, bytes)
         self.forwarded = []
-        self.delayed = []  # replies to be sent to the host: (time to send, number of the request, bytes)
+        self.delayed = []  # delayed replies, not sent to the host yet: (time to send, number of the request, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 

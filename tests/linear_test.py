@@ -73,11 +73,14 @@ class Recording(Case):
         return path
 
     def assert_motion(self, rows):
-        # Rows for gaps are left out, because a busy machine may cause gaps.
-        rows = [row for row in rows if row.get("event") != "gap"]
+        # A busy machine may cause gaps and failed readings: their rows are left out, and the rows after them may have no
+        # speed yet.
+        rows = [row for row in rows if not row.get("event")]
         first = rows[0]
+        self.assertTrue([row for row in rows[5:] if row.get("speed_mm_s")])
         for row in rows[5:]:
-            self.assertAlmostEqual(float(row["speed_mm_s"]), -2**26 / 1000, delta=2)
+            if row.get("speed_mm_s"):
+                self.assertAlmostEqual(float(row["speed_mm_s"]), -2**26 / 1000, delta=2)
             way = -2**26 / 1000 * (float(row["time_s"]) - float(first["time_s"]))
             self.assertAlmostEqual(float(row["unwrapped_mm"]) - float(first["unwrapped_mm"]), way, delta=1)
             self.assertEqual(float(row["unwrapped_mm"]), float(row["position"]) / 1000)

@@ -25,11 +25,7 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that end an operand of `&&` or `
-#
-# `; brackets, `&&` and `
-#
-# ` end it, too.
+# Tokens that end an operand of `&&` or `||`; brackets, `&&` and `||` themselves end an operand, too.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # rules that change arithmetic; they make at most one mutant for a line
@@ -38,6 +34,7 @@ REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
 # Words that show that a declaration is a table; numbers in tables are not mutated.
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
@@ -52,7 +49,7 @@ class Switch(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    file: str  # path of the source file, relative to the folder of sources, as in the id
+    file: str  # path of the source file, relative to the folder of all sources
     rule: str
     line: int
     start: int
@@ -70,7 +67,7 @@ class Mutant(NamedTuple):
 
 def with_switches(text, numbered):
     """Returns `text` with the switches inserted. `numbered`: pairs of number and mutant."""
-    # If one mutant is inside another, its switch is inserted inside the switch of the other.
+    # If the code of one mutant is part of the code of another, its switch is inserted inside the switch of the other.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -174,14 +171,15 @@ class Finder:
         # comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
-        description = "\n".join([rule, after, str(first - begin), *context])
+        code_after = " ".join(COMMENT.sub("", after).split())
+        description = "\n".join([rule, code_after, str(first - begin), *context])
         repetition = self._seen[description] = self._seen.get(description, 0) + 1
         digest = hashlib.sha256(f"{description}\n{repetition}".encode()).hexdigest()[:8]
         name = f"{self.file}:{rule}:{digest}"
         before = self.source.text[start:end]
         self.found.append(Mutant(self.file, rule, line, start, end, before, after, name, switch, constant))
 
-    # ---- Checks
+    # ---- Mutants of checks
 
     def _find_checks(self):
         source = self.source
@@ -306,7 +304,7 @@ class Finder:
             self._mark(first, last)
             self._never(first, last, "&&", "true")
 
-    # ---- Constants
+    # ---- Mutants of constants
 
     def _declared_times(self):
         """Adds mutants of each `constexpr Time name = ...;` and of each `Time name = literal;`."""

@@ -27,7 +27,8 @@ COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
 # Matches compiler errors that come from checks at compile time, such as a static_assert.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
-# GoogleTest filter: programs with switched mutants run only the first series of faults (tests/kit).
+# GoogleTest filter that leaves out all but the first series of faults of tests/kit, used for mutants that are switched
+# at run time.
 FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
 SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
@@ -181,8 +182,8 @@ class Tree:
         """Returns, for each source, the constants that can become functions."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            # Constants of the folder author may be used in every unit, so users are searched in all folders of
-            # protocols.
+            # Constants of absenc/protocol/author may be used in every unit, so users of such a constant are searched in
+            # all folders of absenc/protocol.
             folder = path.parent.parent if path.parent.name == "author" else path.parent
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]

@@ -171,11 +171,19 @@ class MutantIds(unittest.TestCase):
         self.assertEqual(len(set(self.ids(twice))), len(self.ids(twice)))
 
     def test_stay_when_lines_move_or_comments_change(self):
-        moved = TOY.replace("40us;", "40us;  // paragraph 10").replace("\n\nbool", "\n\n\nbool")
+        moved = TOY.replace("40us;", "40us;  ///< paragraph 10").replace("\n\nbool", "\n\n\nbool")
         moved = "// new\n\nint before;\n" + moved
         self.assertEqual(sorted(self.ids(moved)), sorted(self.ids(TOY)))
         indented = TOY.replace("  if (at < free_at_)", "      if (at < free_at_)")
         self.assertEqual(self.ids(indented), self.ids(TOY))
+        other = moved.replace("paragraph 10", "shortest").replace("// new", "/* newer */")
+        self.assertEqual(sorted(self.ids(other)), sorted(self.ids(TOY)))
+
+    def test_stay_when_a_comment_is_inside_the_changed_code(self):
+        first = self.ids("Time limit(Line line) {\n  return line.pause() +\n      9 * line.bit();\n}")
+        commented = self.ids("Time limit(Line line) {\n  return line.pause() +  // why\n      9 * line.bit();\n}")
+        self.assertTrue(first)
+        self.assertEqual(commented, first)
 
     def test_change_with_their_line(self):
         other = self.ids(TOY.replace("40us", "50us"))
@@ -194,6 +202,12 @@ class Script(unittest.TestCase):
         self.assertGreaterEqual(len(coarse), 300)
         self.assertEqual(len(set(coarse)), len(coarse))
         self.assertFalse([name for name in coarse if "_test." in name or "vectors" in name or "fields" in name])
+
+    def test_listed_survivors_are_mutants(self):
+        # A changed line gives its mutants other ids: those listed here must then be tried again.
+        found = {found.id for folder in mutants.unit_folders().values() for found, _, _ in mutants.find_mutants(folder)}
+        known = mutants.read_survivors(SOURCE / "tests" / "mutants_survivors.txt")
+        self.assertEqual([name for name in known if name not in found], [])
 
     def test_distinguishes_failure_from_hang(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -49,7 +49,7 @@ class Case(unittest.TestCase):
 
 
 class PlatformIO(Case):
-    # From https://docs.platformio.org/en/latest/manifests/library-json/
+    # Keys of library.json, from https://docs.platformio.org/en/latest/manifests/library-json/
     KEYS = {"$schema", "name", "version", "description", "keywords", "license", "frameworks", "platforms", "headers",
             "export", "build"}
     BUILD_KEYS = {"includeDir", "srcDir", "srcFilter", "flags", "unflags", "libArchive"}
@@ -135,7 +135,8 @@ endforeach()
 
 
 class EspIdf(Case):
-    # From https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
+    # Keys of idf_component.yml, from
+    # https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
     KEYS = {"version", "description", "license", "tags", "dependencies", "files"}
 
     def test_manifest_has_documented_keys(self):
@@ -185,7 +186,7 @@ include({ROOT}/CMakeLists.txt)
 
 
 class Arduino(Case):
-    # From https://arduino.github.io/arduino-cli/latest/library-specification/
+    # Keys of library.properties, from https://arduino.github.io/arduino-cli/latest/library-specification/
     REQUIRED = {"name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures"}
     OPTIONAL = {"includes", "dot_a_linkage"}
 

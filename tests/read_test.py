@@ -102,7 +102,8 @@ class Readings(EncoderCase):
         readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
         for before, after in zip(readings, readings[1:]):
             turned = (after["angle_deg"] - before["angle_deg"]) % 360
-            # The tolerance is large: the encoder may sample the position later than at the time in `time_s`.
+            # The tolerance for the motion between two readings is large, 0.3 turns: the encoder may sample a position
+            # later than at the time in `time_s`.
             self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
             self.assertGreater(turned, 0)
 

@@ -15,7 +15,7 @@ import numpy
 from command_support import ABSENC, PATIENCE, absenc, end
 from record_test import COLUMNS, RecordCase, wait_until
 
-LOST = 2  # rows of this many seconds may be lost after SIGKILL; on an idle machine at most one second
+LOST = 2  # number of seconds whose rows may be lost after SIGKILL; on an idle machine at most one second is lost
 
 
 def can_be_read(path):

@@ -86,7 +86,7 @@ class Files(RecordCase):
         started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00"))
         self.assertLess(abs((started - before).total_seconds()), PATIENCE)
         self.assert_rising(times(rows))
-        # Rows for gaps are left out, because a busy machine may cause gaps.
+        # Rows that mark gaps between readings are left out, because a busy machine may cause gaps.
         rows = [row for row in rows if row["event"] != "gap"]
         self.assertEqual(len(rows), 20)
         for row in rows:
@@ -101,7 +101,7 @@ class Files(RecordCase):
         self.assert_good(absenc("record", self.encoder("--singleturn", "5"), "--output", self.output("log.jsonl"),
                                 "--count", "12", "--rate", "10"))
         header, rows = read_json_lines(self.output("log.jsonl"))
-        # Rows for gaps are left out, because a busy machine may cause gaps.
+        # Rows that mark gaps between readings are left out, because a busy machine may cause gaps.
         rows = [row for row in rows if row.get("event") != "gap"]
         self.assertEqual((header["absenc_record"], header["protocol"], header["model"]), (1, "tformat", "TS5700N8500"))
         self.assertIn("speed_rpm", header["units"])

@@ -142,7 +142,8 @@ class Abuse(ServeCase):
             begin = time.monotonic()
             self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
             return time.monotonic() - begin
-        # The measurement is repeated until it is good, because a busy machine replies later.
+        # The measurement of the longest response time is repeated until it is below the limit, because a busy machine
+        # responds later.
         wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
 
     def test_idle_connections_of_many_addresses_do_not_block_others(self):

@@ -129,7 +129,8 @@ class Page(ServeCase):
             return self.browser.execute_script("""
                 return Array.from(document.querySelectorAll('.dygraph-axis-label-y'), (label) => label.textContent);""")
         wait_until(lambda: any(float(one) > 59000 for one in labels()), "the turns are drawn")
-        for _ in range(20):  # the check is repeated, because the range of the plot grows
+        # All axis labels must differ. This is checked repeatedly, because the value range of the plot grows.
+        for _ in range(20):
             texts = labels()
             self.assertEqual(len(set(texts)), len(texts), texts)
         cut = """return Array.from(document.querySelectorAll('.dygraph-axis-label-y'))

@@ -295,7 +295,7 @@ class WrongSystemClock(ServeCase):
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock jumped back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # this step of the clock is too small to be reported; some seconds occur twice
+        self.wrong_by(-602)  # sets the clock back by another 2 s: too little to be reported; some seconds occur twice
         readings = self.wait_for_readings(server)
         self.wait_for_readings(server)  # waits until the second in which the readings were recorded is over
         end(server.process)

@@ -228,8 +228,8 @@ class Look(ServeCase):
               done([same, drawings]);
             })();""")
         self.assertEqual(same, 0)
-        # number of redraws in 2 s: `show` was called 60 times, but with many encoders the view redraws about twice a
-        # second
+        # `often` is the number of redraws in 2 s: `show` was called 60 times, but with many encoders the view redraws
+        # only about twice a second
         self.assertIn(often, range(1, 6))
 
     def test_one_encoder_and_none(self):

@@ -174,7 +174,7 @@ class Spool(MqttCase):
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
     def test_survives_kill(self):
-        port = free_port()  # the broker for this port is started later
+        port = free_port()  # the test starts a broker on this port later
         server = self.sender(f"mqtt://127.0.0.1:{port}", ONE, "--rate", "100")
         wait_until(lambda: self.taken(server) > 150, "they are spooled")
         shown = self.taken(server)

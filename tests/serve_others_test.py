@@ -146,7 +146,7 @@ class Prometheus(ServeCase):
                 with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as refused:
-                self.assertEqual(refused.code, 503)  # Prometheus answers with this status until it is ready
+                self.assertEqual(refused.code, 503)  # Prometheus answers with HTTP status 503 until it is ready
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
         dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))

@@ -42,7 +42,8 @@ struct RequestReply : testing::Test {
     host.idle.gap = microseconds(6);
     host.send({0x1A});
     EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
-    line.run_until(line.now());  // processes the event `sent` of the device, which has the same time as the end
+    // processes the event `sent` of the device, which has the same time as the end of the host's conversation
+    line.run_until(line.now());
   }
 };
 
@@ -124,7 +125,7 @@ class SpiDevice final : public Machine<Byte> {
  private:
   void receive_byte(Byte request) {
     if (register_byte_ == 0x88) {
-      register_byte_ = static_cast<Byte>(address_ + 0x40);  // the value that the register at this address has
+      register_byte_ = static_cast<Byte>(address_ + 0x40);  // value of the register: its address plus 0x40
     } else if (previous_ == 0xCD) {
       address_ = request;
       register_byte_ = 0x88;  // code for "read ready"
@@ -199,7 +200,7 @@ struct Clocked : testing::Test {
   sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
   std::string notes;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
-    // the device sends the word of 13 bits twice, then ones
+    // bits that the device sends: its word of 13 bits, the word again, then ones
     if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});
     if (event.kind == Kind::sent && event.bits < 13) notes += "too few clocks: " + std::to_string(event.bits);
   }};
@@ -375,7 +376,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
 
-// (h) Another baud rate during the conversation, after the reply to command 19.
+// (h) Change of the baud rate during the conversation, after the reply to command 19.
 struct BaudChange : testing::Test {
   static constexpr LineSettings fast{.rate = 2'000'000};
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};

@@ -57,7 +57,8 @@ class Toy final : public Machine<Item> {
     queue_.push_back(
         {{.kind = Step<Item>::Kind::transfer, .expect = expect, .bits = bits, .at = at}, std::move(items)});
   }
-  // Sends `out_bits` of the items on a bidirectional clocked link and clocks `bits` clocks in all.
+  // Queues a transfer on a bidirectional clocked link, of `bits` clocks in all: the machine sends the first `out_bits`
+  // bits of the items, the other end sends during the remaining clocks.
   void exchange(std::vector<Item> items, std::size_t out_bits, std::size_t bits, bool goes_on = false, Time at = {}) {
     queue_.push_back(
         {{.kind = Step<Item>::Kind::transfer, .goes_on = goes_on, .bits = bits, .out_bits = out_bits, .at = at},

@@ -24,7 +24,7 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                # The error "nothing in what ..." means that the frame of this unit has no bit for the alarm.
+                # An error with the words "nothing in what" means that the frame of this unit has no bit for the alarm.
                 if "nothing in what" not in refused.stderr:
                     yield about, alarm
 

@@ -101,7 +101,8 @@ class TurningEncoder {
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
-  /// Reads the position once. Returns how the unwrapper has joined the reading to the previous one.
+  /// Reads the position once. Returns whether the unwrapper has continued from the previous reading, started again, or
+  /// ignored the reading.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();

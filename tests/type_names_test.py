@@ -82,7 +82,7 @@ AMBIGUOUS = set("""
 """.split())
 
 KEYS = ("struct", "class", "union", "enum")
-# Tokens that, behind `struct NAME`, show that no body follows.
+# Tokens that show, directly behind `struct NAME`, that this is no definition of the type.
 NO_BODY = set(";(),>=&*")
 
 
@@ -93,7 +93,7 @@ def is_test(path):
 def type_name(source, index):
     """Returns (type name, index of its body) of the definition at `index`, or None."""
     i = index + 1
-    while source[i] in ("class", "struct"):  # the second keyword of `enum class`
+    while source[i] in ("class", "struct"):  # skips the second keyword of `enum class`
         i += 1
     while source[i] == "[":  # skips an attribute such as [[nodiscard]]
         i = source.partner[i] + 1

@@ -119,7 +119,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
     now = std::max(now + std::chrono::milliseconds(1), step.kind == Wanted::wait ? Time{} : step.at);
     if (step.kind != Wanted::wait) {
       conversation->feed({.kind = Kind::sent, .at = now});
-      // A host that clocks the line receives as many bytes as it requests.
+      // A host that clocks the line receives as many bytes as it has clocked, however long the input is.
       if (clocks) items.resize(step.bits != 0 ? (step.bits + 7) / 8 : std::max(step.expect, step.out.size()));
       left = items;
     } else if (!left.empty() || unsolicited) {

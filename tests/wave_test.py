@@ -13,7 +13,7 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
-         "clocked": {"clock", "data"}, "can": {"can"}}
+         "clocked": {"clock", "data"}, "clocked_bidirectional": {"clock", "data", "direction"}, "can": {"can"}}
 # Message of `decode` for the last part of an EncoLink frame that is spread over several exchanges.
 IN_PARTS = "each of the last exchanges carried a part of it"
 

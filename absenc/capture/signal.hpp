@@ -34,7 +34,7 @@ struct Layout {
 
 /// Level changes of one channel; the level alternates, and the times increase strictly.
 struct Changes {
-  bool before = false;  // level before the first change
+  bool before = false;  // level of the channel before its first change
   std::vector<Tick> at;
 };
 
@@ -47,7 +47,8 @@ struct Character {
   // Data bits above the eighth. Later decode_async splits such a character into two of one byte each.
   std::uint8_t high = 0;
   bool bad_parity = false;
-  bool bad_stop = false;  // framing error; with value 0 and a line that stays low it is a break
+  // true: the stop bit was 0 (framing error). If the value is 0 and the line stays low, this is a break.
+  bool bad_stop = false;
   bool is_break = false;
 };
 
@@ -55,9 +56,10 @@ struct Character {
 struct Burst {
   Tick begin = 0;
   Tick end = 0;
-  std::size_t bits = 0;           // number of clocks in the burst
-  std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
-  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed MSB first, the last byte left-aligned
+  std::size_t bits = 0;          // number of clocks in the burst
+  std::vector<std::uint8_t> in;  // bits sent by the encoder, packed MSB first, the last byte left-aligned
+  // SPI, and bidirectional clocked links with a wire of their own: bits sent by the host, packed like `in`
+  std::vector<std::uint8_t> out;
   // true: bits of the burst may be missing at its beginning or end
   bool cut = false;
   // The following members are used only for clocked words without chip select.
@@ -68,6 +70,11 @@ struct Burst {
   bool has_last = false;  // true: `last` is known
   // level behind the last clock change, where a host with one clock per bit takes its last bit
   bool last = false;
+  // levels of the encoder's data line one, two ... clock periods after `last`, the first as the highest of `tail_bits`
+  std::uint32_t tail = 0;
+  std::uint8_t tail_bits = 0;
+  // bidirectional clocked links: levels of the direction wire, packed like `in`; empty: it was not captured
+  std::vector<std::uint8_t> direction{};
 };
 
 struct CanRecord {
@@ -96,7 +103,8 @@ struct Block {
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
-  std::uint64_t file_offset = 0;      // number by which the reader finds the part in `fill`, such as an offset
+  // number by which the reader finds the part of the file when `fill` is called, such as an offset
+  std::uint64_t file_offset = 0;
   std::uint64_t file_size = 0;
 };
 

@@ -16,7 +16,7 @@ namespace absenc::client {
 /// A kind of fault that a campaign injects.
 struct LineFault {
   std::string_view name;     ///< Name of the fault, as `--fault` takes it.
-  std::string_view meaning;  ///< What the fault does to the line, as a phrase.
+  std::string_view meaning;  ///< Damage that the fault does to the line, as a phrase.
   double usual;              ///< Default rate of the fault, 0 to 1.
 };
 
@@ -29,7 +29,7 @@ struct CampaignChoices {
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; empty: the default rates of all faults.
   std::vector<std::string> faults{};
-  /// Number of exchanges to run, at least 1; a few more if the last reading needs them.
+  /// Number of exchanges after which the campaign ends, at least 1; it makes a few more to finish its last reading.
   std::uint64_t exchanges = 100'000;
   std::uint64_t seed = 1;  ///< Seed of faults and shaft positions; the same seed gives the same counts.
   /// Speed of the shaft in revolutions per minute, or mm/s for linear encoders; the host then confirms each position by
@@ -49,9 +49,10 @@ struct CheckWorth {
   /// Hamming distance of the checksum: every error of fewer wrong bits, all of them covered by it, is detected; 0:
   /// above 8.
   unsigned distance = 0;
-  double words = 0;   ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
-  double unseen = 0;  ///< Share of all replies with damage only in covered bits and yet a correct checksum.
-  double taken = 0;   ///< Share of all replies that are damaged, yet accepted with a wrong position.
+  double words = 0;  ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
+  /// Share of all replies with wrong bits only among those that the checksum covers, and yet with a correct checksum.
+  double unseen = 0;
+  double taken = 0;  ///< Share of all replies that are damaged, yet accepted with a wrong position.
   /// Standard deviation of `taken`, the share of accepted damaged replies, which is estimated from random samples.
   double taken_deviation = 0;
 };
@@ -63,7 +64,8 @@ struct Guarded {
   /// that a fault has changed are left out.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
-  double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
+  /// Computed number of wrong positions that pass the frame checks and are then confirmed by a second reading.
+  double let_through = 0;
 };
 
 /// Result of a campaign: numbers of exchanges and shares of errors. In a campaign with a turning shaft (`rpm`),
@@ -87,7 +89,8 @@ struct CampaignResult {
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
   /// Computed strength of the frame check; without a value if it cannot be computed, as on CAN.
   std::optional<CheckWorth> worth{};
-  /// Processor time of the process during the exchanges, in seconds, without the time to compute `worth`.
+  /// Processor time of the process during the exchanges, in seconds; the time to compute the strength of the checksum
+  /// (`worth`) is not included.
   double seconds = 0;
 };
 

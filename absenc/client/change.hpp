@@ -35,12 +35,13 @@ struct Change {
   [[nodiscard]] std::string text() const;
 };
 
-/// Returns the text `what`; unless the state of the change is `none`, a line with the sentence of the change is added.
+/// Returns the text `what`, followed by a line that says whether the encoder was changed, unless the state of the
+/// change is `none`.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
 /// Base class of exceptions that carry the state of a change.
 struct Changing {
-  /// Stores `what_became`, the change and its state when the exception is thrown.
+  /// Stores `what_became`: the change, and its state at the time when the exception is thrown.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
   Change change;  ///< The change and its state when the exception was thrown.
@@ -53,10 +54,10 @@ class OfChange final : public Base, public Changing {
   /// Copies `failure`. `text` is the whole text of the exception, as `with_change` returns it.
   OfChange(const Base& failure, std::string text, Change what_became)
       : Base(failure), Changing(std::move(what_became)), text_(std::move(text)) {}
-  /// Copies `failure` and adds the sentence of the change to its text.
+  /// Copies `failure` and adds to its text the sentence that says whether the encoder was changed.
   OfChange(const Base& failure, const Change& what_became)
       : OfChange(failure, with_change(failure.what(), what_became), what_became) {}
-  /// Returns the text of the failure, followed by the sentence of the change.
+  /// Returns the text of the failure, followed by the sentence that says whether the encoder was changed.
   [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
 
  private:
@@ -66,10 +67,12 @@ class OfChange final : public Base, public Changing {
 /// Returns the change that the exception carries; null if there is none or its state is `none`.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Rethrows the exception that is being handled, with `change` added where possible. Call this only in a catch block.
+/// Rethrows the exception that is being handled, with `change` added if the type of the exception can carry a change
+/// and it carries none yet. Call this only in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// Returns the result of `work`, which changes no encoder; adds `not_sent` to its exceptions.
+/// Returns the result of `work`, which runs before a change is sent and changes no encoder. Exceptions of `work` get
+/// the state `not_sent`.
 template <class Work>
 auto before_change(const Work& work) {
   try {

@@ -44,7 +44,7 @@ class BreakingPort final : public Port<Item> {
     if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
     --left_;
   }
-  Link link_;  // owner of `port_`, which it keeps alive
+  Link link_;  // owns the port to which `port_` refers
   Port<Item>& port_;
   std::size_t left_;
 };
@@ -141,7 +141,7 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
   for (const Values& values : candidates) {
     try {
       if (run(address, command, values).change.state == ChangeState::confirmed) return values;
-    } catch (const UsageError&) {  // skips options with which the command does not exist
+    } catch (const UsageError&) {  // skips option values with which the command does not exist
     }
   }
   return std::nullopt;
@@ -218,7 +218,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
             const Ended ended = run(bad, command, values);
             count(counts, ended);
             require_truth(ended, good, fmt::format("{} {}", bad, command.name));
-          } catch (const UsageError&) {  // skips a fault that the unit's link cannot have
+          } catch (const UsageError&) {  // skips a fault that cannot occur on the unit's kind of line
           }
         }
       }

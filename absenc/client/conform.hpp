@@ -26,13 +26,14 @@ struct ClauseResult {
   std::string_view paragraph{};  ///< Paragraph of the document that contains the clause.
   std::string_view words{};      ///< Requirement of the clause, in words.
   Verdict verdict{};             ///< Whether the encoder or the host complies with the clause.
-  std::string evidence{};        ///< What was observed and how often; if the clause is untested, the reason.
+  /// Observed behaviour and how often it was observed; if the clause is untested, the reason.
+  std::string evidence{};
 };
 
-/// Results of the tests of a unit's clauses.
+/// Results of a conformance test: one for each clause of the unit's document.
 struct Conformance {
   std::string protocol{};               ///< Identifier of the unit.
-  std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
+  std::vector<ClauseResult> clauses{};  ///< Results of the clauses, in the order in which the unit lists its clauses.
   /// Commands with which the user restores values that the test left changed; empty: none.
   std::vector<std::string> left{};
 
@@ -43,15 +44,15 @@ struct Conformance {
   [[nodiscard]] Verdict verdict() const;
   /// Returns the results in the Test Anything Protocol, version 13.
   [[nodiscard]] std::string tap() const;
-  /// Returns the results as JUnit XML.
+  /// Returns the results of all clauses as JUnit XML.
   [[nodiscard]] std::string junit() const;
-  /// Returns the results as text for people.
+  /// Returns the results of all clauses as text for people.
   [[nodiscard]] std::string report() const;
 };
 
 /// Limits of a conformance test of an encoder: its length, and the changes it may make.
 struct ConformChoices {
-  std::size_t readings = 100;  ///< Number of readings, at least 1.
+  std::size_t readings = 100;  ///< Number of readings that the test takes, at least 1.
   /// Whether clauses that change the encoder are tested too; values are restored where possible.
   bool changes = false;
   /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing restores.

@@ -17,7 +17,7 @@ namespace absenc::client {
 
 /// Kinds of findings, in the order in which an examination lists them.
 enum class FindingKind : std::uint8_t {
-  // Findings about faults of the port
+  // The following findings are about the port.
   port_missing,
   port_forbidden,
   port_in_use,
@@ -28,11 +28,11 @@ enum class FindingKind : std::uint8_t {
   port_failed,
   latency_timer,
   direction_unswitched,
-  // Findings about faults of the bus
+  // The following findings are about a CAN bus.
   can_bus_off,
   can_not_acknowledged,
   can_errors,
-  // Findings about faults of the line and of what is connected to it
+  // The following findings are about the line and the devices that are connected to it.
   never_silent,
   line_inverted,
   wrong_baud,
@@ -48,7 +48,7 @@ enum class FindingKind : std::uint8_t {
   modem_answers,
   no_answer,
   baud_pattern,
-  // Findings about faults of frames, beginning with what an adapter or its driver does to bytes
+  // The following findings are about damaged frames; the first of them are changes that an adapter or its driver makes.
   byte_before,
   byte_after,
   flow_control,
@@ -72,16 +72,16 @@ enum class FindingKind : std::uint8_t {
   requests_damaged,
   refused,
   counter_stands,
-  // Findings about faults of times
+  // The following findings are about replies that come too late or too slowly.
   reply_late,
   sometimes_late,
   reply_slow,
-  // Findings about states that the encoder reports
+  // The following findings are about states that the encoder reports.
   starting,
   alarm,
   status,
   position_invalid,
-  // Findings about faults of the position
+  // The following findings are about wrong or implausible positions.
   position_noise,
   position_jumps,
   position_frozen,
@@ -101,9 +101,9 @@ struct Finding {
   FindingKind finding_kind{};  ///< Kind of the finding.
   std::string_view id{};       ///< Identifier of the kind, as "only_echo".
   Severity severity{};         ///< How serious the finding is.
-  std::string evidence{};      ///< What was observed, as a sentence.
+  std::string evidence{};      ///< Observation that led to the finding, as a sentence.
   std::string cause{};         ///< Most probable cause of the finding.
-  std::string action{};        ///< What the user should do.
+  std::string action{};        ///< Action that the user should take.
 
   /// Returns the whole finding on one line: "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION".
   [[nodiscard]] std::string sentence() const;

@@ -26,7 +26,7 @@ struct EmulateChoices {
 /// How often the virtual encoder checked a rule of the document, and how often it was broken.
 struct RuleCount {
   std::string_view rule{};   ///< The rule, in words.
-  std::uint64_t looked = 0;  ///< Number of times that the rule was checked.
+  std::uint64_t looked = 0;  ///< Number of times that the virtual encoder checked the rule.
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 

@@ -37,7 +37,7 @@ enum class PositionState : std::uint8_t {
 /// Returns a sentence for people that describes `state`.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
-/// Result of one attempt to read or to open the port. Instants are those of os::now.
+/// Result of one attempt to read the encoder or to open its port. Times are those of os::now.
 struct Sample {
   /// Kind of a sample: a reading, a failure, or an event of the port.
   enum class Kind : std::uint8_t {

@@ -18,7 +18,7 @@ int decimals(double uncertainty) {
 
 double rounded(double value, int decimals) {
   const double scale = std::pow(10, decimals);
-  return std::round(value * scale) / scale + 0.0;  // adding 0.0 turns -0.0 into 0.0
+  return std::round(value * scale) / scale + 0.0;  // the result -0.0 plus 0.0 is 0.0, so that no "-0.0" is printed
 }
 
 }  // namespace

@@ -34,8 +34,9 @@ struct FoundEncoder {
 /// Result of `identify` and `identify_capture`: the encoders that explain the received or captured frames.
 struct Identified {
   std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
-  std::vector<std::string> notes{};   ///< Sentences about impossible attempts, damaged data and contradictions.
-  bool is_complete = true;            ///< False if the time limit ended the search early.
+  /// Sentences about protocols that could not be tried, damaged data, and identities that contradict the options.
+  std::vector<std::string> notes{};
+  bool is_complete = true;  ///< False if the time limit ended the search early.
 };
 
 /// Time limit and callback of `identify`.

@@ -6,7 +6,8 @@
 namespace absenc::client {
 
 double joint_degrees(const Joint& joint, double position_deg) {
-  return joint.direction * (position_deg - joint.offset) / joint.gear + 0.0;  // adding 0.0 turns -0.0 into 0.0
+  // an angle of -0.0 plus 0.0 is 0.0, so that no "-0.0" is printed
+  return joint.direction * (position_deg - joint.offset) / joint.gear + 0.0;
 }
 
 double joint_millimetres(const Joint& joint, double position_mm) {

@@ -33,7 +33,8 @@ struct Joint {
 
 /// Angles of joint and motor from one reading; a member without a value is not known.
 struct JointAngles {
-  /// Angle of a rotary joint, in degrees; right only up to whole turns if the encoder counts none.
+  /// Angle of a rotary joint, in degrees; if the encoder counts no turns, it may be wrong by whole turns of the
+  /// encoder.
   std::optional<double> joint_deg{};
   std::optional<double> joint_mm{};  ///< Position of a linear joint, in millimetres.
   /// Speed of a rotary joint in revolutions per minute; without a value if it is not known.

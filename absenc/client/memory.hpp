@@ -108,7 +108,7 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory in three steps: look, write, verify. They throw the exceptions of Memory.
+/// A change of the memory in three steps: `look`, `write`, `verify`. These functions throw the exceptions of Memory.
 class MemoryChange {
  public:
   /// Prepares the change without sending anything. Throws UsageError.
@@ -123,7 +123,7 @@ class MemoryChange {
   /// Reads the byte of `unknown` again, to find out whether it was written. Ignores a failure.
   void settle();
 
-  /// Returns the wanted bytes with their addresses.
+  /// Returns the bytes that the memory is to contain, with their addresses.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
   /// Returns the bytes that `look` read at the wanted addresses.
   [[nodiscard]] const MemoryImage& found() const { return found_; }

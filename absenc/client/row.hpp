@@ -21,7 +21,7 @@ enum class ColumnType : std::uint8_t { int64, uint64, real, boolean, flags, text
 struct Column {
   /// Number format in text and CSV, and which tables or lists leave the value out.
   struct Presentation {
-    /// Format of a real number, as for std::format; "": the shortest text of the same number.
+    /// Format of a real number, as for std::format; "": the shortest text from which the same number can be read back.
     std::string_view format{};
     bool is_detail = false;  ///< Whether tables with one line for each row leave the value out.
     /// Whether the number is shown in hexadecimal; tables of values show it in decimal nevertheless.

@@ -11,7 +11,8 @@ namespace {
 // Returns one end of Wilson's confidence interval: the lower end for a `side` of -1, the upper end for 1.
 double wilson(const Share& share, double side) {
   if (share.of == 0) return side > 0 ? 1 : 0;
-  if (share.count == 0 && side < 0) return 0;  // returns exactly 0: the formula would give rounding errors
+  // a share of 0 has the lower end 0 exactly; the formula would return a rounding error
+  if (share.count == 0 && side < 0) return 0;
   constexpr double z = 1.96;
   const auto n = static_cast<double>(share.of);
   const double p = share.rate();

@@ -35,7 +35,8 @@ struct Reading {
   bool multiturn_valid = false;        ///< Whether the number of revolutions in `multiturn` can be trusted.
   /// true: it is known whether `singleturn` is valid; false: it is not, so `singleturn` must not be used
   bool singleturn_known = true;
-  bool multiturn_known = true;  ///< true: it is known whether `multiturn` is valid
+  /// true: it is known whether `multiturn` is valid; false: it is not, so `multiturn` must not be used
+  bool multiturn_known = true;
   /// true: the encoder counts turns below zero, and `multiturn` is in two's complement
   bool multiturn_signed = false;
   double unit_um = 0;        ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
@@ -75,7 +76,7 @@ struct Reading {
 
 /// Returns the angle in degrees, 0 to below 360; a revolution has 2^bits counts, 1 to 64 bits.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  // for many bits the quotient may be rounded up to 360, which is out of range
+  // with more than 48 bits the quotient might be rounded up to 360, so only the upper 48 bits are used
   if (bits > 48) return degrees(counts >> (bits - 48), 48);
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }

@@ -24,7 +24,8 @@ class BitCrc {
       return ((remainder << 1) & mask) ^ (feedback ? parameters.poly & mask : 0);
     };
     if (parameters.width == 0) return;
-    std::uint32_t one = step(0, true);  // remainder of a single 1 at the present bit position
+    // remainder, by the polynomial of the CRC, of a single 1 at the present bit position
+    std::uint32_t one = step(0, true);
     for (std::size_t row = 0; row < used_; ++row) {
       for (unsigned bit = 1; bit < 16; bit *= 2, one = step(one, false)) {
         for (unsigned i = 0; i < bit; ++i) table_[row][bit + i] = static_cast<Entry>(table_[row][i] ^ one);

@@ -34,7 +34,7 @@ TEST(BitCrc, EqualsDefinitionForEveryWidthAndLength) {
   }
 }
 
-// A count that is no multiple of 4 uses a part of its last row of the table.
+// If the number of bits is no multiple of 4, only a part of the last row of the CRC table is used.
 TEST(BitCrc, LeadingZerosChangeOnlyInitialValue) {
   sim::Random random(4);
   const CrcParameters parameters{16, 0x90D9, 0, false, false, 0xFFFF};

@@ -60,7 +60,7 @@ TEST(BitView, FindsTheEndOfARun) {
   EXPECT_EQ(bits.end_of_run(1), 8u);
   EXPECT_EQ(bits.end_of_run(3), 8u);
   EXPECT_EQ(bits.end_of_run(8), 16u);
-  // the run does not have 19 bits: the bits after the end of the view do not count
+  // the run of equal bits ends with the view, because bits behind the view do not count
   EXPECT_EQ(bits.end_of_run(16), 18u);
 }
 

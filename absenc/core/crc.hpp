@@ -16,9 +16,9 @@ namespace absenc {
 struct CrcParameters {
   unsigned width;        ///< width of the checksum in bits: 3 to 16, but 0 to 16 for the class BitCrc
   std::uint16_t poly;    ///< Polynomial of the CRC without its highest term.
-  std::uint16_t init;    ///< Value of the register before the first byte.
+  std::uint16_t init;    ///< Value of the CRC register before the first byte.
   bool refin;            ///< Whether each byte is processed lowest bit first.
-  bool refout;           ///< Whether the register is reflected before `xorout`.
+  bool refout;           ///< Whether the bits of the CRC register are reversed before `xorout` is applied.
   std::uint16_t xorout;  ///< Value that is combined with the register by exclusive OR to give the checksum.
 
   /// Returns whether two CRCs have the same parameters.
@@ -43,7 +43,7 @@ struct CrcParameters {
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
-/// Sizes of the constant table that `Crc` uses.
+/// Sizes of the look-up table that the class `Crc` uses.
 enum class CrcTable {
   byte,    ///< table of 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
   nibble,  ///< table of 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware

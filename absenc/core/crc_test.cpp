@@ -81,7 +81,8 @@ template <CrcParameters parameters>
 constexpr Engines engines{parameters, [](Bytes bytes) -> std::uint16_t { return Crc<parameters>::of(bytes); },
                           [](Bytes bytes) -> std::uint16_t { return Crc<parameters, CrcTable::nibble>::of(bytes); }};
 
-// Whether refout differs from refin changes only the final step, so one sample for each pair is enough.
+// A refout that differs from refin only changes the last step of the CRC, so one sample for each of these two pairs is
+// enough.
 template <unsigned width>
 constexpr std::array engines_of_width{
     engines<sampled(width, 0, false, false)>, engines<sampled(width, 1, false, false)>,

@@ -27,7 +27,8 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // no silence is reported before a step was sent, or an item or line error arrived
+    // true, so that no silence is reported until a transfer or pulse was sent, or an item or a line error arrived
+    silence_reported_ = true;
     take_steps(now);
   }
   /// Returns whether a conversation runs.
@@ -70,7 +71,7 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Takes the machine's steps. Call it after something other than an event has changed which step the machine wants.
+  /// Takes the machine's next steps. Call it after the machine was changed by a call instead of an event.
   void wake(Time now) {
     if (is_busy() && !waiting_ && !sending_) take_steps(now);
   }
@@ -178,7 +179,7 @@ class Carrier {
     }
   }
 
-  // greatest number of received characters that are gathered
+  // greatest number of received characters that are gathered before they are delivered
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
   // Members that are used for every received character come first, so that short instructions can address them.

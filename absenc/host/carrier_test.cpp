@@ -144,7 +144,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
             }),
             "2 at 12; error; 2 at 15; ");
   EXPECT_EQ(fed_by([&](auto& one) {
-              characters(one, 1, 5ns);  // one character arrives before the request is sent
+              characters(one, 1, 5ns);  // one character arrives at 5 ns, before the request is sent at 10 ns
               one.sent(10ns);
               characters(one, 2, 11ns);
               one.received(std::span(reply).first(3), 15ns);

@@ -54,7 +54,8 @@ class Service {
 /// The times that a CyclicHost keeps, and its line.
 struct CyclePlan {
   Time period{};        ///< time from one cycle to the next
-  LineSettings line{};  ///< settings of the line, from which the durations of requests and replies follow
+  /// settings of the line, from which the durations of requests and replies follow; a conversation may set another rate
+  LineSettings line{};
   /// longest time from a request to its reply, if shorter than the protocol's limit; 0: the protocol's limit
   Time answer{};
   Time rest{};     ///< shortest silence between a reply and the next request
@@ -76,9 +77,10 @@ struct Cycle {
   Kind kind = Kind::missing;  ///< kind of this cycle
   /// missing: the error of the reading; `busy` if the reading had not ended when the next cycle began
   Error error = Error::none;
-  Time begun{};             ///< time at which the cycle began
-  Reading reading{};        ///< the last reading; it is of this cycle if the cycle is fresh or invalid
-  std::uint32_t stale = 0;  ///< number of cycles since the last fresh one; 0: this cycle is fresh
+  Time begun{};  ///< time at which the cycle began
+  /// the last reading; it was read in this cycle if `kind` is fresh or invalid, else in an earlier one
+  Reading reading{};
+  std::uint32_t stale = 0;  ///< number of cycles since the last cycle that gave a valid position; 0: this cycle did
   /// Returns the time from the latch of `reading` to `at`.
   [[nodiscard]] Time age(Time at) const { return at - reading.latched; }
 };
@@ -138,6 +140,10 @@ class CyclicHost final : public Machine<Item> {
   void take_service_step(const Step<Item>& step, Time now);
   bool begin_service(Step<Item>& step, Time now);
   void end_service(State state);
+  // Stores the bit rate that a conversation sets, because the durations of transfers follow from it.
+  void set_rate(const Step<Item>& step) {
+    if (step.rate != 0) plan_.line.rate = step.rate;
+  }
   void begin_transfer(Step<Item>& step);
   void limit(Step<Item>& step, Time now) const;
   // Returns whether the position of the next cycle may come with the reply to the service's request.
@@ -164,13 +170,14 @@ class CyclicHost final : public Machine<Item> {
   std::uint32_t unasked_ = 0;
   User user_ = User::nobody;
   bool wants_ = false;
-  bool is_row_ = false;       // no position may be requested before the service has sent its next request
-  bool is_too_long_ = false;  // the service's next request did not fit between two positions
+  // true: the service keeps the line, so no position may be requested before the service has sent its next request
+  bool is_row_ = false;
+  bool is_too_long_ = false;  // true: the service's next request did not fit between two positions
   bool takes_ = false;        // the running cycle belongs to the service, so that no position is read
   bool carries_ = false;      // the position of the running cycle comes with the service's reply
-  bool is_concluded_ = true;  // the result of the running cycle was emitted
+  bool is_concluded_ = true;  // true: the result of the running cycle was emitted
   bool emitting_ = false;
-  bool in_transfer_ = false;    // the transfer on the line has not ended
+  bool in_transfer_ = false;    // true: the transfer that was begun on the line has not ended
   bool ends_by_items_ = false;  // the transfer ends when its items are received: on SPI and clocked links
 };
 
@@ -261,6 +268,7 @@ bool CyclicHost<Item, Read>::continue_position(Step<Item>& step, Time now) {
       conclude_position(now);
       return false;
     case Kind::configure:
+      set_rate(step);
       return true;
     case Kind::wait:
       limit(step, now);
@@ -293,7 +301,7 @@ void CyclicHost<Item, Read>::conclude_with(const Reading& reading) {
 
 // ---- Services
 
-// Asks the service for its next step, while it does not use the line.
+// Asks the conversation of a service that does not use the line now for its next step.
 template <class Item, class Read>
 void CyclicHost<Item, Read>::run_service(Time now) {
   while (service_ != nullptr && user_ == User::nobody && !wants_ && now >= wake_) {
@@ -366,11 +374,12 @@ bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   step = step_;
   wants_ = takes_ = false;
   if (step.kind == Kind::configure) {
+    set_rate(step);
     wake_ = now;
     return true;
   }
   step.at = start;
-  is_row_ = step.holds_line;
+  is_row_ = step.holds_line || step.goes_on;
   user_ = User::service;
   begin_transfer(step);
   return true;
@@ -404,15 +413,17 @@ void CyclicHost<Item, Read>::limit(Step<Item>& step, Time now) const {
 // Returns the duration of the items of a transfer and its reply, or of a pulse.
 template <class Item, class Read>
 Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
-  const LineSettings line = plan_.line.with_some_rate();
+  LineSettings line = plan_.line.with_some_rate();
+  if (step.rate != 0) line.rate = step.rate;
   if (step.kind == Kind::pulse) return step.width;
-  if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
+  if (step.bits != 0) return line.bits(step.bits + line.idle_clocks) + (step.goes_on ? step.width : Time{});
   if constexpr (is_can) {
     // number of bits of an extended CAN frame with 8 data bytes, with stuff bits
     constexpr unsigned longest_frame = 160;
     return line.bits(longest_frame * (step.out.size() + step.expect));
   } else {
-    if (step.answer == Time{} && step.expect != 0) {  // SPI
+    // only a transfer on an SPI link expects items without a time limit for an answer
+    if (step.answer == Time{} && step.expect != 0) {
       return line.select_lead + line.bits(8 * std::max(step.out.size(), step.expect));
     }
     const Time pauses = step.frame != 0 ? static_cast<int>(step.out.size() / step.frame) * step.width : Time{};

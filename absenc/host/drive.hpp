@@ -10,7 +10,7 @@ namespace absenc::host {
 /// done. Exceptions pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
-  // The time of an event serves until the next event, because reading the clock takes time.
+  // The time of the last event is taken as the present time until the next event, because reading the clock takes time.
   for (Time now = port.now();;) {
     const Step<Item> step = machine.next(now);
     switch (step.kind) {

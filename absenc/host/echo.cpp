@@ -35,7 +35,8 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // Before the reply begins, the encoder may still use its answer time: the `gap` limit must not be shorter.
+  // Between the echo and the reply the encoder may need its answer time, so the `gap` limit must not be shorter than
+  // the `answer` limit.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }

@@ -70,7 +70,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
   std::size_t echo_due_ = 0;   // mode on: number of echo bytes still to be received
   std::size_t echoed_ = 0;     // number of echo bytes received after the last request
   std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects; 0: unknown
-  bool passed_ = false;        // bytes of the reply have been passed to the conversation
+  bool passed_ = false;        // true: bytes of the reply have been passed to the conversation
   bool only_echo_ = false;
 };
 

@@ -104,11 +104,11 @@ class FirstReading {
   }
 
   [[nodiscard]] constexpr std::uint64_t reach(const Place& place, Time between) const {
-    constexpr std::uint64_t noise = 4;  // noise of a position, in counts
+    constexpr std::uint64_t noise = 4;  // greatest noise of a position that is assumed, in counts
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }
-  // Returns the largest distance that can be judged: 15/32 of 2^bits counts.
+  // Returns the largest distance of two positions of `bits` bits that can be judged: 15/32 of 2^bits counts.
   [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;

@@ -68,7 +68,8 @@ TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
 }
 
 TEST(FirstReading, RefusesMuchFasterShaft) {
-  // The counts have 13 bits. In 1 ms 819 counts are allowed, and four times as many at the third position.
+  // `step` is in counts of 13 bits. At 6000 rpm 819 of them are allowed in 1 ms, and at the third position four times
+  // as many.
   for (const std::uint64_t step : {1638u, 3276u, 3500u}) {
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));

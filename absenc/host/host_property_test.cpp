@@ -43,7 +43,7 @@ RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::in
   unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
   const std::int64_t offset = unwrapper.position() - position;
   for (int i = 1; i <= 200; ++i) {
-    // Steps go from minus half the range up to one count below half the range.
+    // The distance between two positions goes from minus half the counted range up to one count below half this range.
     position += *rc::gen::weightedOneOf<std::int64_t>(
         {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
     RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);
@@ -158,7 +158,8 @@ RC_GTEST_PROP(UnwrapProperty, JumpsFromFourTimesTheSpeedLimitOn, ()) {
   }
 }
 
-/// Expects that the integers and the real numbers of `velocity` agree within the rounding that `speed` states.
+/// Expects that the speed computed with integers and the speed computed with floating point agree within the rounding
+/// errors that `Velocity::speed` states.
 void expect_same_speed(const Velocity& velocity) {
   const MilliSpeed speed = velocity.speed();
   const auto whole = static_cast<double>(speed.speed), around = static_cast<double>(speed.uncertainty);
@@ -202,7 +203,7 @@ RC_GTEST_PROP(VelocityProperty, IntegersEqualRealNumbersInOneWindow, ()) {
 }
 
 RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {
-  // Speed is in counts/s, acceleration in counts/s^2; each reading is late by up to half a period.
+  // `speed` is in counts/s, `acceleration` in counts/s^2. Each reading is late by a random time, at most half a period.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);

@@ -84,7 +84,8 @@ void OutstandingRequests<Item>::mark_lost(Items request, Time longest) {
   entry->sent_at.clear();
 }
 
-// Removes a lost request of `entry` first, because a late reply may belong to it.
+// Removes the oldest request of `entry`. If requests of the entry were lost, one of those is removed, because a late
+// reply may belong to it.
 template <class Item>
 void OutstandingRequests<Item>::remove_oldest(Entry& entry) {
   if (entry.lost != 0) {

@@ -26,13 +26,14 @@ class OutstandingRequests {
 
   /// Requests with the same bytes, which may have been sent several times.
   struct Entry {
-    Request request;            ///< Items of the request.
-    std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
-    Buffer<Time, 4> sent_at{};  ///< Times at which the requests that are not lost were sent, the oldest first.
+    Request request;         ///< Items of the request.
+    std::size_t expect = 0;  ///< Number of items of the reply to this request; 0: unknown before it ends.
+    /// Times at which the requests of this entry that do not count as lost were sent, the oldest first.
+    Buffer<Time, 4> sent_at{};
     /// Time at which the oldest lost request is assumed to have been sent.
     Time lost_first{};
     Time lost_last{};   ///< Time at which the newest lost request was sent.
-    unsigned lost = 0;  ///< Number of these requests that count as lost, but may still be answered.
+    unsigned lost = 0;  ///< Number of requests of this entry that count as lost, but may still be answered.
 
     /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
@@ -81,7 +82,8 @@ class OutstandingRequests {
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
-  /// Returns the longest time between consecutive requests since the list was empty, or from the last until `now`.
+  /// Returns the longest time between two consecutive requests since the list was empty, the time from the last request
+  /// until `now` included.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
   /// Removes the entries whose newest request was sent before `before`.
   void remove_older(Time before);

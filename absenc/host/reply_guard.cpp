@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Silence that `required_silence` demands on the line, in multiples of the longest timeout.
+// Length of the silence that the function `required_silence` demands on the line, in multiples of the longest timeout.
 constexpr int silent_timeouts = 4;
 // Upper limit of a wait for late replies, unless 3/2 of the expected lateness is longer.
 constexpr Time longest_silence = 2500ms;
@@ -424,7 +424,8 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The reply may answer any of several equal requests; the time since the newest one is its least lateness.
+    // The reply may answer any of several equal requests; the time since the newest of these requests is the smallest
+    // possible lateness.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));

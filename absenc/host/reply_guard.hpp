@@ -68,12 +68,12 @@ class ReplyGuard final : public Machine<Item> {
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // whether to feed a `received` event with the items that arrived
+    bool reply = false;  // whether the conversation is still to get the received items as a `received` event
     bool timeout = false;
     Time received_at{};
   };
   struct Forwarding {
-    bool answerable = false;  // the last request belongs to the present exchange
+    bool answerable = false;  // true: the last request was sent in the exchange that is not over yet
     bool received = false;    // items were received that may belong to the reply to the last request
     bool doubtful = false;    // matching found no valid reply, so older requests are still outstanding
     Report report{};
@@ -94,7 +94,7 @@ class ReplyGuard final : public Machine<Item> {
   };
   struct Listening {
     Time until{};      // end of listening: the request is then repeated, or a timeout reported
-    Time suspected{};  // how late the stored reply is, if it is a late one
+    Time suspected{};  // time from the older request to the stored reply, if this is a late reply to that request
   };
   // The request that the conversation wants to send; valid in all phases but forwarding.
   struct Pending {

@@ -24,7 +24,7 @@ namespace absenc::host {
 struct Counters {
   /// conversations without an error whose position was not found wrong later; each result of a stream counts
   std::uint64_t good = 0;
-  std::uint64_t repeated = 0;  ///< repeated attempts, each after an error
+  std::uint64_t repeated = 0;  ///< number of attempts that repeated a command after an error
   /// replies on the line that arrived after their timeout and were dropped, also those for other encoders
   std::uint64_t late = 0;
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
@@ -220,7 +220,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // set to true again when the conversation has given its next result
+      streaming_ = false;  // becomes true again below when the conversation has stopped at its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -231,9 +231,11 @@ class Session {
         return conversation;
       }
       ++counters_.errors[static_cast<std::size_t>(error)];
-      if (error == Error::timeout) doubt();  // after a timeout the encoder may have been switched off
+      // after a timeout the first position must be confirmed anew, because the encoder may have been switched off
+      if (error == Error::timeout) doubt();
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      // A reply arrived after the timeout, and the reply to another attempt would most likely be late, too.
+      // A reply arrived after the timeout. The command is not repeated, because the reply to another attempt would most
+      // likely be late, too.
       if (error == Error::timeout && late() != late_before) return conversation;
       ++counters_.repeated;
     }
@@ -253,8 +255,9 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // Returns whether the reply guard is used. No reply is late where the host drives the clock; on CAN a conversation
-  // that listens needs all frames.
+  // Returns whether replies to this command pass the reply guard. Where the host drives the clock they do not, because
+  // no reply is late. On CAN only replies to commands that read do, because a conversation that listens needs all
+  // frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return !host_clocks(unit_->link);
@@ -315,10 +318,10 @@ class Session {
   FirstReading first_;
   Apart apart_;
   Time shortest_interval_ = never;      // shortest time between a reading and one that was read directly after it
-  bool confirmed_ = false;              // the last reading was confirmed
-  bool known_ = false;                  // a reading was confirmed since the last call of `doubt`
+  bool confirmed_ = false;              // true: the position of the last reading was confirmed
+  bool known_ = false;                  // true: a position was confirmed since the last call of `doubt`
   bool streaming_ = false;              // the present conversation has stopped at a result and can continue
-  std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream when it stopped last
+  std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream that were already counted
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;
 };

@@ -166,7 +166,7 @@ TEST(Session, RepeatsRepeatableCommands) {
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  // 3 more position requests; the reset request of the zero command is never sent
+  // the zero command has sent three more position requests, but not the request that sets the zero
   EXPECT_EQ(bench.device->answer_count(), 6u);
 }
 
@@ -182,7 +182,7 @@ TEST(Session, FeedsStatisticsWithEveryAttempt) {
 
   Bench good(EchoMode::off);
   good.session->observe(&statistics);
-  good.read();  // reads twice, because the first position must be confirmed
+  good.read();  // sends two requests, because a second position must confirm the first one
   EXPECT_EQ(statistics.latencies().count(), 2u);
   // The latency is 3 us of the encoder and 11 characters of 4 us each.
   EXPECT_EQ(statistics.latencies().longest(), std::chrono::microseconds(47));
@@ -212,7 +212,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  // The first answer could be the late reply to an earlier request: the request is repeated.
+  // The first reply could be the late reply to an earlier request, so the session sends the request again.
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
@@ -259,7 +259,8 @@ TEST(SessionGuard, ReadsImpossiblePositionAgain) {
   bench.session->observe(&statistics);
   EXPECT_EQ(bench.answers_of_a_reading(), 2u) << "the first needs a second";
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
-  bench.answer_wrong(turn / 32);  // farther than the shaft can move at 10 000 rpm, but too near to count as a jump
+  // this wrong position is farther away than the shaft can move at 10 000 rpm, but too near to count as a jump
+  bench.answer_wrong(turn / 32);
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
   EXPECT_TRUE(bench.session->confirmed());
   EXPECT_EQ(bench.refused(), 1u);

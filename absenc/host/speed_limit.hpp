@@ -68,7 +68,8 @@ class Reach {
     const int exponent = static_cast<int>(bits >> 52 & 0x7FF) - (1023 + 31);
     if (mm_s == 0) return {0, 0, false};
     const int zeros = std::countl_zero(std::uint64_t{mm_s});
-    const std::uint64_t speed = (std::uint64_t{mm_s} << zeros) / unit + 1;  // the quotient is from 2^31 to 2^33
+    // a dividend from 2^63 to 2^64 and a divisor from 2^31 to 2^32 give a quotient from 2^31 to 2^33
+    const std::uint64_t speed = (std::uint64_t{mm_s} << zeros) / unit + 1;
     return {(speed << 30) / 1'000'000 + 1, zeros + exponent + 30, false};
   }
   /// Returns the reach of the shaft or carriage that `resolution` describes, within `limit`.

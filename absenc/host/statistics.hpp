@@ -112,8 +112,8 @@ class Rate {
 
   bool seen_ = false;
   Time last_{};
-  double events_ = 0;       // number of events, in which older ones count less
-  double nanoseconds_ = 0;  // time in which these events arrived, in which older times count less
+  double events_ = 0;       // number of events, of which older ones count as less than one
+  double nanoseconds_ = 0;  // time in nanoseconds in which these events happened; the older a time, the less it counts
 };
 
 /// A failed exchange with its bytes, which are cut at the size of the buffers.

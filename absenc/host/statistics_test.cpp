@@ -143,7 +143,8 @@ TEST(Statistics, CountsGoodConversations) {
   EXPECT_EQ(statistics.latencies().count(), 4u);
   EXPECT_EQ(statistics.latencies().longest(), 90us);
   EXPECT_EQ(statistics.kept(), 1u);
-  ended.sent_at = ended.received_at;  // equal times: the exchange had no request
+  // equal times of request and reply mean that the exchange had no request, so its latency is not counted
+  ended.sent_at = ended.received_at;
   statistics.add(ended);
   EXPECT_EQ(statistics.latencies().count(), 4u);
 }

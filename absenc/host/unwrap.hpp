@@ -96,7 +96,8 @@ class Unwrapper {
   [[nodiscard]] constexpr std::uint64_t share(const Reading& reading, Time between) const {
     return reach_of(reading).share(between, resolution_of(reading));
   }
-  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, as a fraction times 2^32
+  // half the range that the encoder counts, in units of 2^-32 of this range
+  static constexpr std::uint64_t half = std::uint64_t{1} << 31;
 
   // Returns whether the shaft can have moved by at most 15/16 of half the counted range since the last reading;
   // `longest_gap` has the same limit.
@@ -104,7 +105,8 @@ class Unwrapper {
     return share(reading, apart(reading)) < half / 16 * 15;
   }
 
-  // Allows the whole half of the counted range, because the intervals `at` already contain the unknown latch times.
+  // Returns whether the shaft surely moved less than half the counted range. No margin is subtracted from this half,
+  // because the interval `at` already contains the unknown latch time.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     return times_ == Times::arrived || share(reading, at.latest - last_at_.earliest) < half;
   }
@@ -126,7 +128,8 @@ class Unwrapper {
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // the number is unsigned, so that its wrap after 2^63 counts is defined
+  // the continuous position, stored as an unsigned number, so that its wrap after 2^63 counts is defined
+  std::uint64_t position_ = 0;
   Reading last_{};
   LatchTime last_at_{};
 };

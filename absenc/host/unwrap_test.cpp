@@ -70,7 +70,7 @@ TEST(Unwrapper, UsesTurnAloneIfTurnsAreInvalid) {
   lost.multiturn_valid = false;
   EXPECT_EQ(unwrapper.add(lost), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 8);
-  // The turns are valid again, but differ by more than any motion explains.
+  // The turns are valid again, but differ from the last ones by more than any motion explains.
   EXPECT_EQ(unwrapper.add(multiturn(0, 20, 2ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
@@ -106,7 +106,8 @@ TEST(Unwrapper, HasADefaultLimit) {
 }
 
 TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at 600 rpm 8 turns take 800 ms, and half a turn takes 50 ms
+  // at 600 rpm the shaft needs 800 ms for half the range of the turn counter (8 turns), and 50 ms for half a turn
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);

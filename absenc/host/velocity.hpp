@@ -32,7 +32,7 @@ class Velocity {
   /// A window this many times as long as `window` is used even if its speed is less certain.
   static constexpr int longest_windows = 20;
 
-  /// Longest time for `window`; a longer one is reduced to it.
+  /// Longest duration that can be desired as `window`; a longer one is reduced to it.
   static constexpr Time longest_window = std::chrono::minutes(2);
 
   /// Makes the calculation. `window`: desired time over which the speed is measured, above 0.
@@ -91,9 +91,11 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // A window is certain enough with this many counts, and if it is this many times as long as its uncertainty.
+  // A window of positions is certain enough if the position moved by this many counts in it, and if it is this many
+  // times as long as its uncertainty.
   static constexpr int enough = 20;
-  static constexpr int least = 4;  // ratio of window to uncertainty from which the longest window is used
+  // The longest window is used already if it is this many times as long as its uncertainty.
+  static constexpr int least = 4;
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {
@@ -144,7 +146,8 @@ class Velocity {
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
-  // The true distance may be one count longer or shorter than the measured one.
+  // Fastest and slowest speed in counts/s that are possible: the true distance may be one count longer or shorter than
+  // the measured one.
   [[nodiscard]] constexpr double fastest() const {
     return per_second(static_cast<double>(moved_from(start_)) + 1, shortest_time());
   }
@@ -161,7 +164,7 @@ class Velocity {
     if (old != 0) remove(0, old);
   }
 
-  // Removes one position, so that old ones are stored at longer intervals than new ones.
+  // Removes one stored position, chosen so that old positions are stored at longer intervals than new ones.
   constexpr void thin_out() {
     std::size_t closest = 1;
     std::int64_t closest_gap = gap(1);
@@ -177,7 +180,8 @@ class Velocity {
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
   }
-  // The times are in units of about 1 us, so that the product of two fits into 64 bits.
+  // Gaps and ages of stored positions are computed in units of about 1 us, so that the product of two fits into 64
+  // bits.
   [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
     return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
   }
@@ -188,7 +192,7 @@ class Velocity {
     size_ -= count;
   }
 
-  // Selects the shortest window whose speed has a low enough uncertainty.
+  // Selects the shortest window of positions whose speed has a low enough uncertainty.
   constexpr void choose_start() {
     Time longer = size_ > 1 ? span(size_ - 2) : Time{};
     for (std::size_t i = size_ - 1; i-- > 0;) {

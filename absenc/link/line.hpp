@@ -20,8 +20,7 @@ enum class LinkKind : std::uint8_t {
   can,
 };
 
-/// Returns whether the host clocks every item, so that the encoder sends only while the host clocks.
-/// Returns whether frames are sequences of bits, which need not fill whole bytes.
+/// Returns whether frames on links of this kind are sequences of bits, which need not fill whole bytes.
 [[nodiscard]] constexpr bool carries_bits(LinkKind kind) {
   return kind == LinkKind::clocked || kind == LinkKind::clocked_bidirectional;
 }
@@ -47,6 +46,7 @@ struct LineSettings {
   std::uint8_t spi_mode = 0;     ///< SPI and clocked links: clock mode, 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};            ///< SPI: minimum time from chip select to the first clock
+  Time delay{};                  ///< bidirectional clocked: delay of line and transceivers, there and back
   /// Highest rate in bits per second that the encoder's document allows; 0: not stated.
   std::uint32_t highest_rate = 0;
 

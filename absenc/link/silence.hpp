@@ -38,7 +38,8 @@ class Silence {
   }
 
  private:
-  Time since_{};           // end of the last transfer or pulse, time of the last activity, or begin of the silence
+  // begin of the silence: end of the last transfer or pulse of this end, or of the last other activity
+  Time since_{};
   bool received_ = false;  // an item was received since the last transfer or pulse
   bool reported_ = false;
 };

@@ -107,7 +107,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 /// A reader that splits received bytes into lines, and resumes after garbage.
 class LineReader {
  public:
-  /// Event that a received byte completes.
+  /// Event that a byte received from the adapter completes.
   enum class LineEvent : std::uint8_t {
     nothing,
     line,     ///< `line()` is complete and valid until the next byte; may be empty

@@ -106,7 +106,7 @@ TEST(SlcanReader, SplitsLinesAndRefusals) {
 TEST(SlcanReader, ResumesAfterGarbage) {
   using Lines = std::vector<std::string>;
   EXPECT_EQ(found("xyt1200\r"), (Lines{"garbage", "t1200"}));
-  // The CR after the first frame was lost.
+  // The CR at the end of the first frame's line was lost.
   EXPECT_EQ(found("t12084726t1200\rt0800\r"), (Lines{"garbage", "t1200", "t0800"}));
   const std::string endless(100, '5');
   EXPECT_EQ(found(endless + "\rt1200\r"), (Lines{"garbage", "t1200"}));

@@ -18,12 +18,13 @@ template <class Item>
 struct Step {
   /// Actions that a machine requests from its port.
   enum class Kind : std::uint8_t {
-    wait,       ///< no action until the next event
-    transfer,   ///< not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
-    pulse,      ///< not before `at`: drive `wire` active for `width`
-    configure,  ///< switch this end of the line to `rate`; all else stays as it is
-    emit,       ///< a result is ready; the caller reads it and calls `next` again
-    done,       ///< the conversation has ended
+    wait,      ///< no action until the next event
+    transfer,  ///< not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
+    pulse,     ///< drive the wire `wire` active for the time `width`, beginning not before `at`
+    /// switch this end of the line to `rate` bits per second; all other settings of the line stay as they are
+    configure,
+    emit,  ///< a result is ready; the caller reads it and calls `next` again
+    done,  ///< the conversation has ended
   };
 
   Kind kind = Kind::wait;  ///< requested action
@@ -44,13 +45,16 @@ struct Step {
   /// Transfer on a bidirectional clocked link: the host drives the data line with `out` during this number of clocks,
   /// then it releases the line.
   std::size_t out_bits = 0;
-  std::uint32_t rate = 0;  ///< configure: new rate in bits per second
-  Time at{};               ///< transfer, pulse: earliest time to begin; wait: time of `timer`, if in the future
+  /// Configure: new rate in bits per second. Transfer on a bidirectional clocked link: rate of the clock for this
+  /// transfer; 0: it stays as it is.
+  std::uint32_t rate = 0;
+  Time at{};  ///< transfer, pulse: earliest time to begin; wait: time of `timer`, if in the future
   /// Transfer, wait: `silence` is due this long after `sent` if nothing is received; 0: no limit.
   Time answer{};
   Time gap{};  ///< transfer, wait: `silence` is due this long after an item; 0: no limit
-  /// Pulse: its duration. Transfer in frames: the pause between two frames. Clocked device: the time for which the
-  /// device drives the data line low after the last clock edge, behind the bits of `out`.
+  /// Transfer with `goes_on`: longest duration of the rest of the exchange. Pulse: its duration. Transfer in frames:
+  /// the pause between two frames. Clocked device: the time for which the device drives the data line low after the
+  /// last clock edge, behind the bits of `out`.
   Time width{};
 
   /// Returns the byte that a host samples after all of `out`, on an SPI or clocked link whose device sends `out`.

@@ -6,7 +6,7 @@
 
 #include "absenc/protocol/clause.hpp"
 
-// A line has the folder and the name of a unit's descriptor. ABSENC_UNITS in CMakeLists.txt may replace the list.
+// Each line has a unit's folder and the name of its descriptor. ABSENC_UNITS in CMakeLists.txt may replace the list.
 // clang-format off
 #ifndef ABSENC_UNITS
 #define ABSENC_UNITS(one) \
@@ -25,6 +25,7 @@
   one(biss, chain_unit) \
   one(nikon, unit) \
   one(hiperface, unit) \
+  one(endat, unit) \
 
 #endif
 // clang-format on

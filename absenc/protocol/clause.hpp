@@ -74,7 +74,7 @@ struct Ask {
   /// Without `wire` and `make`: name of the command that is sent; "": the one that reads the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
-  bool wrong_end = false;  ///< Whether one bit of the request's last byte is wrong; not used with `wire`.
+  bool wrong_end = false;  ///< Whether the test flips one bit in the last byte of the request; not used with `wire`.
   /// Writes the request into `request` and returns its length; null: `wire` or `command` gives the request.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
   /// Bit rate of the request in 1/1000 of the line's rate; 0: the line's rate.
@@ -95,7 +95,8 @@ struct Clause {
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
   Demand demand;               ///< Kind of the clause, which selects its test.
-  /// Conditions on options, separated by blanks: "carries=biss crc_width!=0"; empty: none.
+  /// Conditions on options under which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: the
+  /// clause always applies.
   std::string_view needs{};
   Errors errors = 0;  ///< for Demand::as_drawn: errors of replies that break the clause; 0: form_errors
   Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
@@ -152,8 +153,9 @@ struct HostClause {
   HostDemand demand;           ///< Kind of the clause, which selects its test.
   /// For HostDemand::rule and HostDemand::row: name of the rule that hosts must keep.
   std::string_view rule{};
-  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if the hosts that
-  /// the tests use for every clause keep this clause. Two rules that every such host breaks together are one clause.
+  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if none of the
+  /// hosts that the tests use for every clause breaks this clause. If each such host that breaks one rule also breaks
+  /// another, both rules belong into one clause.
   std::array<HostScript, 2> breaks{};
   HostScript keeps{};  ///< a scripted host that keeps this clause, with requests like those of `breaks`; empty: none
   /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".
@@ -163,7 +165,8 @@ struct HostClause {
 /// Rule that os::SpiDevice checks, because a virtual encoder cannot see the clock's edges.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
-/// The clauses of a unit. The unit's descriptor does not refer to them, because firmware links the descriptor.
+/// The clauses of a unit. The unit's descriptor has no pointer to them, because firmware would then link the clauses,
+/// too.
 struct Clauses {
   std::span<const Clause> encoder{};   ///< Clauses for encoders, in the order in which they are tested.
   std::span<const HostClause> host{};  ///< Clauses for hosts.

@@ -64,7 +64,7 @@ class CompiledWord {
   }
 
  private:
-  // The place of a field in the number that has the word.
+  // The place of a field in the number whose bits are those of the word.
   struct Part {
     std::uint64_t mask = 0;
     std::uint8_t shift = 0;
@@ -76,7 +76,7 @@ class CompiledWord {
   // Returns the values of the fields with Meaning::value.
   template <std::size_t size>
   [[nodiscard]] constexpr std::array<std::uint64_t, size> numbers_of(std::uint64_t high) const {
-    // Cleared in two halves, because g++ clears a whole array by a slow `rep stos`.
+    // The array is cleared in two halves, because g++ clears a whole array by a slow `rep stos`.
     std::array<std::uint64_t, size> numbers;
     for (std::size_t i = 0; i < size / 2; ++i) numbers[i] = 0;
     for (std::size_t i = size / 2; i < size; ++i) numbers[i] = 0;
@@ -108,7 +108,8 @@ class CompiledWord {
   bool odd_ = false;
   bool gray_ = false;
   std::uint8_t value_count_ = 0;
-  std::array<Part, WordFormat::maximum_fields> values_{};  // the fields whose meaning is Meaning::value
+  // places of the fields that carry other values than position, turns and flags (Meaning::value)
+  std::array<Part, WordFormat::maximum_fields> values_{};
 };
 
 }  // namespace absenc

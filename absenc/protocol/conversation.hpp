@@ -25,7 +25,7 @@ struct Exchange {
 
 /// Two texts for people that explain an error; either may be empty.
 struct Explanation {
-  std::string_view detail{};  ///< the step that failed, and the evidence for it
+  std::string_view detail{};  ///< the step of the command that failed, and the evidence for this
   std::string_view advice{};  ///< what to try, instead of the error's own advice
 };
 
@@ -38,8 +38,8 @@ struct StreamCounts {
 /// Whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
-  yes,      ///< the request was sent, or possibly sent
-  refused,  ///< the request was sent, but the encoder refused it, or reading back shows no change
+  yes,      ///< a request that changes the encoder was sent, or possibly sent
+  refused,  ///< such a request (see `yes`) was sent, but the encoder refused it, or reading back shows no change
 };
 
 /// Host side of one command. Its result, at the step `emit` or `done`, is valid until the next call of `feed` or

@@ -17,8 +17,9 @@ class Interruption {
     received_at_.reset();
     due_ = 0;
   }
-  /// Returns whether the byte received at `at` begins a request, or is the first after `begin` or a pause. `length`:
-  /// length of a request that begins with the byte, or 0; `character`: time of one character.
+  /// Returns whether the byte received at `at` is the first byte of a request, or the first byte after the call of
+  /// `begin` or after a pause. `length`: length of a request that begins with this byte, or 0; `character`: duration of
+  /// a character.
   bool begins_request(std::size_t length, Time at, Time character) {
     const bool begins_run = !received_at_ || at - *received_at_ > 2 * character;
     received_at_ = at;

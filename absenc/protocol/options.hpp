@@ -18,7 +18,8 @@ namespace absenc {
 /// Choices of an option that is true or false; the value is the index.
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
-/// Choices of an option that states whether other encoders share the line. `tell_shared` replaces `auto`.
+/// Choices of an option that states whether other encoders share the line. The function `tell_shared` replaces the
+/// choice `auto`.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
 /// Values of an option with `sharing_choices`: unknown, shared, alone.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };

@@ -39,7 +39,8 @@ enum class Role : std::uint8_t {
   exchange,  ///< field: a part of the request or of its encoding, which says nothing about the encoder's state
 };
 
-/// Returns whether a field of this role is the position, the turns, or valid only while the position is.
+/// Returns whether a field with this role is the position, is the turns, or has a value that is valid only while the
+/// position is valid.
 [[nodiscard]] constexpr bool is_of_reading(Role role) {
   return role == Role::position || role == Role::turns || role == Role::of_position;
 }

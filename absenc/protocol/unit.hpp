@@ -57,7 +57,7 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  /// Whether the command is treated as a change of the encoder.
+  /// Whether programs treat the command as one that changes the encoder.
   bool changes_encoder = false;
   bool repeatable = true;  ///< Whether the same command may be sent again after an error.
   /// For verb config_set: name of the config_get command that reads the setting; "": none.
@@ -367,6 +367,9 @@ struct Unit {
   /// in this reply that answers the host's bit; nothing: this reply has no such bit. Null: no reply of the unit has
   /// one.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
+  /// Bidirectional clocked links: returns the ranges of bits of this burst that the host sends, in their order; the
+  /// others are the reply. Null: other links.
+  BitRanges (*host_bits)(const Options& options, Frame burst) = nullptr;
   /// Returns the reading `now`, completed by alarms of `before`, the completed reading before it. Null: readings are
   /// not completed.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;

@@ -90,7 +90,7 @@ struct PlacedField {
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
-  /// Type of the decoded values of the word.
+  /// C++ type of the decoded values of the word.
   using Word = absenc::Word;
   const Format& format;    ///< Format of the encoder, of which the word format is a part.
   const WordFormat& word;  ///< Format of the position word.
@@ -115,7 +115,7 @@ struct Known {
   static constexpr const auto& format = known;           ///< Format of the encoder, of which the word format is a part.
   static constexpr const WordFormat& word = known.word;  ///< Format of the position word.
   static constexpr std::size_t size = word.fields().size();  ///< Number of fields of the word.
-  /// Type of the decoded values of the word.
+  /// C++ type of the decoded values of the word.
   using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
 
   /// The field `i` of the word, with its place as constants.
@@ -337,7 +337,7 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
   const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
-  if (bits.multiturn_first) format.add(turns);  // `add` refuses a field of 0 bits
+  if (bits.multiturn_first) format.add(turns);  // a part of 0 bits is left out, because `add` refuses a field of 0 bits
   format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;

@@ -69,7 +69,8 @@ struct WordField {
 /// Error in the text of a word format; `reason` is empty if there is none.
 struct WordFormatError {
   std::string_view reason{};  ///< Why the text is no word format; empty: it is one.
-  std::size_t at = 0;         ///< index in the text at which the error is; its length: something is missing at the end
+  /// index in the text of the error; if it is the length of the text, something is missing at the end
+  std::size_t at = 0;
 };
 
 /// Format of a position word as data: its fields in order.

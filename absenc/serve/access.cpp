@@ -56,7 +56,8 @@ std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// Returns the origin of a URL, without the port if it is the usual one; "" for "". Throws UsageError.
+// Returns the origin of a URL (scheme, host, port), without the port if it is 443 for https or 80 for http; "" for "".
+// Throws UsageError.
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
@@ -142,7 +143,7 @@ bool Access::names_this_server(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // the browser names no other site as the source of the request
+  if (request.origin.empty()) return true;  // the header Origin, which would name another site, is missing
   return equals_ignoring_case(request.origin, "http://" + request.host) ||
          equals_ignoring_case(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
@@ -153,7 +154,8 @@ bool Access::needs_token(const Request& request, Right right) const {
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
-// Returns the IP address of the client. Only the last entry of X-Forwarded-For was written by the proxy.
+// Returns the IP address of the client. Behind a proxy on this computer, this is the last entry of X-Forwarded-For: the
+// proxy wrote it, while the client may have written the entries before it.
 std::string Access::client_of(const Request& request) const {
   if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
   const std::string& list = request.forwarded_for;

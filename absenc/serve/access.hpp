@@ -20,7 +20,7 @@ namespace absenc::serve {
 class Access {
  public:
   enum class Right : std::uint8_t {
-    open,    // the page itself and the health check: such requests need no token
+    open,    // requests for the page itself or the health check, which need no token
     read,    // requests for data that the server has already read
     poll,    // requests that poll the encoder or interrupt its readings, without changing it
     change,  // requests that run a command of the encoder or acknowledge an alarm
@@ -46,7 +46,7 @@ class Access {
   /// Returns the response to a request with a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
-  /// Returns the number of requests with a wrong token since the start.
+  /// Returns the number of requests with a wrong token since the server started.
   [[nodiscard]] std::uint64_t wrong_tokens() const;
 
  private:

@@ -288,7 +288,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues `order` for the encoder of `watch`. If the order is refused, the response has HTTP status 409.
+// Queues `order` for the encoder that `watch` reads. If `watch` refuses the order, the response has HTTP status 409.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
@@ -331,7 +331,7 @@ void Api::past_as_csv(const std::string& encoder, const Request& request, const 
     std::weak_ptr<Stream> stream{};
   };
   const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
-  // Queues the next rows of a CSV response; runs each time the queue of the stream is empty.
+  // Queues the next rows of a CSV response; runs each time all queued rows of this response are sent.
   const auto next = [reader = &chronicler_->reader(), rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();
     if (stream == nullptr || stream->over()) return;

@@ -69,7 +69,8 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
   changed_.notify_all();
 }
 
-// Returns whether the action of a caller of `when_written` can run now. The caller must hold the mutex.
+// Returns whether some action that was passed to `when_written` can run now, because the events for which it waits were
+// written or cannot be written. The caller of this function must hold the mutex.
 bool Chronicler::has_ready_caller() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }

@@ -37,7 +37,7 @@ class Chronicler {
  public:
   /// `fleet` and `server_events` must outlive this object. Throws HistoryInUse.
   Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
-  /// Writes the remaining seconds and events into the history.
+  /// Writes the remaining events, and the values of the remaining seconds, into the history.
   ~Chronicler();
 
   /// Adds events to be written. `added`: number of all events since the start of the server, including these
@@ -67,10 +67,10 @@ class Chronicler {
   mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   std::vector<ServerEvent> unwritten_events_;
-  std::uint64_t added_ = 0;  // number of events since the start, including those in `unwritten_events_`
+  std::uint64_t added_ = 0;  // number of events since the server started, including `unwritten_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

@@ -14,9 +14,9 @@ namespace absenc::serve {
 /// The open HTTP connections of the server. Not thread-safe.
 class Connections {
  public:
-  // greatest number of connections outside the reserve; these may carry any request
+  // Greatest number of connections that may carry any request. Further connections belong to the reserve.
   static constexpr std::size_t most = 480;
-  // Greatest number of connections of one IP address outside the reserve, so that other addresses have room, too.
+  // Greatest number of those `most` connections that one IP address may have, so that other addresses have room, too.
   static constexpr std::size_t most_of_address = 384;
   // greatest number of connections in the reserve; these carry vital requests only
   static constexpr std::size_t reserve = 32;
@@ -28,7 +28,7 @@ class Connections {
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
   /// Adds a connection. To make room, may close idle connections, put the new connection into the reserve, or close
-  /// it.
+  /// the new connection.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request` is called.

@@ -119,7 +119,7 @@ std::string Fleet::reload() {
       continue;
     }
     added.push_back(now.name);
-    // New encoders of the same rate are read at different times, spread over one period.
+    // New encoders with the same rate of readings are read at different times, spread over one period.
     const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     next.push_back(

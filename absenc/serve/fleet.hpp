@@ -25,7 +25,7 @@ class Fleet {
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  /// Ends the reading threads of all encoders, and their orders.
+  /// Ends the reading threads of all encoders, and waits for the end of each. Orders that have not begun are refused.
   void end();
 
   /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words. Throws

@@ -16,7 +16,8 @@ using namespace client;
 
 namespace {
 
-// A second of calendar time can occur twice: the clock was set back, or the server was restarted.
+// Adds a row for one second of an encoder. The row is merged with an existing row of the same calendar second: a second
+// occurs twice if the clock was set back or the server was restarted.
 constexpr const char* add_second = R"(
 INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
 ON CONFLICT (encoder, at) DO UPDATE SET
@@ -63,7 +64,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
     open();
   } catch (const HistoryInUse&) {
     throw;
-  } catch (const std::runtime_error& failure) {  // this is client::Failure or os::Failure
+  } catch (const std::runtime_error& failure) {  // `open` throws client::Failure or os::Failure
     trouble_ = failure.what();
     reader_.refuse(trouble_);
   }
@@ -87,7 +88,7 @@ void HistoryWriter::open() {
   reader_.accept();
 }
 
-// Ensures that an intact history file is open at the path.
+// Ensures that an intact history file is open, and that it is the file at the path of the history.
 void HistoryWriter::require_file() {
   if (file_) {
     const HistoryFile::State state = file_->check();
@@ -215,8 +216,8 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Returns the calendar second before which a tenth of the rows lie, of the encoder with most rows; if no encoder has
-// rows, a tenth of the events.
+// Returns the calendar second before which the oldest tenth of the rows lies, counting only the encoder that has most
+// rows. If no encoder has rows, returns the calendar second before which the oldest tenth of the events lies.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(
@@ -262,7 +263,8 @@ Sqlite& HistoryReader::database() {
 }
 
 Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_t most) {
-  // The rows of a response begin at multiples of the step, so a range may need one row more than its length suggests.
+  // Each row of a response stands for `step` seconds and begins at a multiple of `step`, so a range may need one row
+  // more than its length divided by `step`.
   most = std::max<std::int64_t>(1, most);
   std::int64_t step = std::max<std::int64_t>(1, (range.to_s - range.from_s) / most + 1);
   while (range.to_s / step - range.from_s / step >= most) ++step;

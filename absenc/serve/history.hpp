@@ -40,18 +40,18 @@ class HistoryReader {
   HistoryReader& operator=(const HistoryReader&) = delete;
 
   /// Returns the object {"encoder","step_s","rows"} with at most `most` rows, each for `step_s` seconds: [[at_s,
-  /// least, mean, greatest, speed least, mean, greatest, readings, errors],...]
+  /// least, mean and greatest position, least, mean and greatest speed, number of readings, number of errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
   /// Returns at most `most` events of `encoder` in `range`, the newest first; `encoder` "": all events.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns up to `most` rows as CSV, and the calendar second at which the rows after these start; a second later
-  /// than `range.to_s` if there are no more rows.
+  /// Returns up to `most` rows as CSV, and the calendar second from which the next call must read the rows that
+  /// follow: `range.to_s` + 1 if no rows follow in the range.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 
  private:
   friend class HistoryWriter;
-  /// Closes the history file. Until `accept`, each query throws Failure with `why`.
+  /// Closes the history file. Until `accept` is called, each query throws Failure with the text `why`.
   void refuse(const std::string& why);
   void accept();
   Sqlite& database();
@@ -106,7 +106,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t unreported_losses_ = 0;  // number of rows and events that were lost and are not in a note yet
+  std::uint64_t unreported_losses_ = 0;  // number of lost rows and events that no text in `notes_` reports yet
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

@@ -38,12 +38,12 @@ class HistoryFile {
 
   /// Closes a history file in state `changed`, without a change of the file or of its write-ahead log.
   void close();
-  /// Closes a history file in state `gone` or `replaced`, and removes its write-ahead log from the path, or renames
-  /// it.
+  /// Closes a history file in state `gone` or `replaced`. Removes its write-ahead log, or renames the log if SQLite
+  /// cannot write it into the database file.
   void close_moved();
-  /// Renames and closes a damaged history file. Returns the new name. Throws Failure.
+  /// Renames and closes a damaged history file. Returns its new name. Throws Failure.
   std::string set_aside();
-  /// Renames the history file at `path`, with its log. Returns the new name. Throws Failure.
+  /// Renames the history file at `path` and its write-ahead log. Returns the new name of the file. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:
@@ -51,7 +51,7 @@ class HistoryFile {
   [[nodiscard]] bool passes_quick_check() const;
 
   std::string path_;
-  // The owned file stays open until the database is closed: closing the file would release SQLite's locks.
+  // The history file, opened a second time beside SQLite. Closing it before the database would release SQLite's locks.
   std::unique_ptr<os::OwnedFile> owned_file_;
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;    // identity of the write-ahead log of SQLite

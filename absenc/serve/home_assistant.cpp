@@ -73,7 +73,7 @@ class Discovery {
   [[nodiscard]] Retained alarm() const {
     Json json = entity("alarm", "Alarm");
     json.set("state_topic", state_topic_).set("device_class", "problem");
-    // Home Assistant interprets None as "unknown".
+    // Home Assistant shows the value None as "unknown": the encoder has not reported whether an alarm is raised.
     json.set("value_template", "{{ 'ON' if value_json.alarms else 'None' if value_json.alarms is none else 'OFF' }}");
     json.set("json_attributes_topic", state_topic_);
     return retained("binary_sensor", "alarm", json);

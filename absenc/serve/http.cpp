@@ -21,7 +21,8 @@ namespace absenc::serve {
 
 namespace {
 
-// Greater than the limits of Connections: at its own limit, libmicrohttpd would accept no connection.
+// Limit of libmicrohttpd for open connections, at which it would accept no more. The limit is never reached, because
+// `Connections` closes connections at a lower number.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
 // Memory of each connection in bytes, for headers and unsent output.
 constexpr std::size_t memory_for_each = 64 * 1024;
@@ -96,7 +97,7 @@ struct Stream::Sending {
   bool over = false;   // whether the connection of the stream has ended
   std::uint64_t dropped = 0;
 
-  // The caller must hold the mutex.
+  // Resumes the connection of the stream if it is suspended. The caller must hold the mutex.
   void resume() {
     if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
   }
@@ -143,7 +144,7 @@ void Stream::push(Text text) {
   if (sending_->over || sending_->ended || text->empty()) return;
   std::deque<Text>& queue = sending_->queue;
   queue.push_back(std::move(text));
-  // The first text of the queue may be partly sent, so the second one is dropped.
+  // A full queue drops its second text, because the first one may be partly sent.
   if (queue.size() > std::max<std::size_t>(sending_->most, 2)) {
     queue.erase(queue.begin() + 1);
     ++sending_->dropped;
@@ -276,7 +277,7 @@ struct HttpServer::Daemon {
     return queued;
   }
 
-  // Queues the answer, or suspends the connection until there is one.
+  // Hands the answer to a request to libmicrohttpd, or suspends the connection until the answer is known.
   MHD_Result respond(MHD_Connection* connection, Exchange& exchange) {
     const std::lock_guard lock(exchange.mutex);
     if (exchange.response) return queue(connection, *exchange.response);
@@ -373,7 +374,7 @@ struct HttpServer::Daemon {
         MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
-    static_cast<void>(listener.socket.release());  // libmicrohttpd closes the listening socket
+    static_cast<void>(listener.socket.release());  // from here on, libmicrohttpd owns the listening socket
   }
 
   // libmicrohttpd must not be stopped while connections are suspended.

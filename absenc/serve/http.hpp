@@ -48,7 +48,7 @@ class Stream {
   using Text = std::shared_ptr<const std::string>;
 
   /// `most`: greatest number of queued texts, at least 2. `on_empty` is called when the queue is empty; it runs in
-  /// the thread of the connections and must return quickly.
+  /// the thread that serves all connections, and must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
@@ -62,7 +62,8 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the connection last took data of the stream; before that, when the stream was made.
+  /// Returns the time at which the connection last took data of the stream; before the first time, the time at which
+  /// the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:

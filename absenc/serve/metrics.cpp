@@ -29,8 +29,8 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// Writes the header of a metric. The caller must write its lines next: the Prometheus format requires them
-  /// together.
+  /// Writes the header of a metric. The caller must write the value lines of this metric next, because the Prometheus
+  /// format requires them directly behind the header.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }

@@ -24,9 +24,10 @@ struct MqttHealth {
   bool failing = false;       // whether the disk refuses new readings, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
-  std::uint64_t sent = 0;           // spooled messages that the broker has accepted since the start
-  std::uint64_t dropped = 0;        // number of readings lost since the start, for example because the spool was full
-  std::uint64_t client_deaths = 0;  // number of times since the start that the MQTT client process ended unexpectedly
+  // The next three counts begin at 0 when MQTT is started, also after a change of its settings.
+  std::uint64_t sent = 0;           // number of spooled messages that the broker has accepted
+  std::uint64_t dropped = 0;        // number of readings lost, for example because the spool was full
+  std::uint64_t client_deaths = 0;  // number of times that the MQTT client process ended unexpectedly
   // Number of the last reading that is in the spool on disk or was sent, by name of the encoder.
   std::map<std::string, std::uint64_t> taken{};
 

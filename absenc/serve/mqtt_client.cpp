@@ -62,7 +62,8 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ == State::lost) return state_;
   const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
   if (ready.to_read) receive();
-  // Frames are received before others are sent: the last frames of an ended process may give the reason of its end.
+  // Frames from the MQTT client process are received before frames to it are sent: if the process has ended, its last
+  // frames may give the reason.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - last_frame_at_ > longest_silence) {
     process_.end({});

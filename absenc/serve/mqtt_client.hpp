@@ -39,20 +39,21 @@ struct MqttIdentity {
 /// A connection to a broker through the MQTT client process. Not thread-safe.
 class MqttClient {
  public:
-  /// Starts the MQTT client process. Throws client::Failure or os::Failure.
+  /// Starts the MQTT client process. Throws client::Failure or os::Failure if it cannot start or cannot use `broker`.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
   /// Queues a request to connect to `host`, a name or an address. With `try_all`, each IP address of the name is
-  /// tried in turn; else one.
+  /// tried in turn; otherwise only one of them.
   void connect(const std::string& host, bool try_all);
-  /// Waits at most `longest`, then receives and sends. Returns the state of the connection.
+  /// Waits until frames can be exchanged with the MQTT client process, at most for the time `longest`, and exchanges
+  /// them. Returns the state of the connection to the broker.
   State work(Time longest);
   /// Returns why the connection to the broker is lost; "" if it is not lost.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
-  /// Returns whether the broker has refused the version of MQTT.
+  /// Returns whether the broker has refused the version of MQTT with which this client tried to connect.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
   /// Returns whether the MQTT client process ended unexpectedly.
   [[nodiscard]] bool died() const { return died_; }

@@ -64,7 +64,8 @@ void MqttCollector::work(const std::stop_token& stop) {
   }
 }
 
-// The text of the spool's run makes a message id unique: after a power failure, the spool may use a number again.
+// Returns the message id that subscribers see: the number in the spool, behind a random text that changes each time
+// the spool is opened. The number alone is not unique, because after a power failure the spool may use it again.
 std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
 
 void MqttCollector::collect() {

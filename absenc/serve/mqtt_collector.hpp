@@ -27,7 +27,7 @@ class MqttCollector {
 
   struct Figures {
     std::string trouble{};      // why the spool cannot be written; "" without an error
-    std::uint64_t dropped = 0;  // number of readings lost since the start
+    std::uint64_t dropped = 0;  // number of readings lost since this object was made
     bool drops = false;         // whether readings were dropped within the last 30 seconds
     // number of the last reading that is in the spool on disk or was sent, by name of the encoder
     std::map<std::string, std::uint64_t> taken{};
@@ -50,7 +50,8 @@ class MqttCollector {
   // The members from here to `mutex_` are used by one thread at a time: the collector thread, then the destructor.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // number of the next reading, by name of the encoder
-  // Number of the last spooled reading that is not in `Figures::taken` yet, by name of the encoder.
+  // Number of the last reading that was given to the spool, by name of the encoder; copied into `Figures::taken` as
+  // soon as the spool keeps no message in memory.
   std::map<std::string, std::uint64_t> not_on_disk_;
   Spool::Counts unreported_{};  // counts of dropped messages and readings that no event has reported yet
   std::string unreported_reason_;
@@ -61,7 +62,7 @@ class MqttCollector {
   std::vector<ServerEvent> waiting_;
   Figures figures_;
   Time last_dropped_{};
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

@@ -30,7 +30,7 @@ namespace absenc::serve {
 /// Returns the payload of the server's state message; `state` is "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);
 
-/// A retained MQTT message. It is published again when `condition` has changed.
+/// A retained MQTT message. It is published again only if `condition`, which describes its content, has changed.
 struct Retained {
   std::string topic;
   std::string condition;

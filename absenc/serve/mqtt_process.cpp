@@ -181,7 +181,7 @@ class MqttProcess {
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
     // mosquitto_loop_read is called even if the connection has ended, because it reports the reason.
     const auto [reads, writes] = broker_ready_;
-    errno = 0;  // libmosquitto reads errno after calls that do not set it
+    errno = 0;  // libmosquitto reads errno even after calls that do not set it, so an old value must not remain
     int error = MOSQ_ERR_SUCCESS;
     // A TLS handshake begins with a read, even when the library wants to write.
     const bool begins = broker_.tls && !connected_ && writes;
@@ -192,7 +192,8 @@ class MqttProcess {
     note(error);
   }
 
-  // Reason codes of the broker below 128 are those of MQTT 3.1.1, which have their own texts.
+  // Handles the answer of the broker to CONNECT. A `reason` below 128 is a return code of MQTT 3.1.1, for which
+  // libmosquitto has other texts than for the reason codes of MQTT 5.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;
@@ -260,7 +261,7 @@ int run_mqtt_process() {
     MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
     return 0;
   } catch (const std::exception&) {
-    return 1;  // the parent process detects that this process has ended
+    return 1;  // no message is needed: the parent process detects that this process has ended
   }
 }
 

@@ -71,7 +71,7 @@ void MqttSender::work(const std::stop_token& stop) {
       run_connection(stop);
     } catch (const Failure& failure) {
       set_lost(failure.what());
-    } catch (const os::Failure& failure) {  // for example, the host name of the broker cannot be resolved
+    } catch (const os::Failure& failure) {  // thrown, for example, if the broker's host name cannot be resolved
       set_lost(failure.what());
     }
     if (version_ != tried) continue;
@@ -94,7 +94,7 @@ void MqttSender::run_connection(const std::stop_token& stop) {
   retained_.clear();
   next_states_ = {};
   std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
-  // With TLS the host name is used, because the certificate is issued for it.
+  // With TLS the client connects to the host name and not to an IP address, because the certificate names the host.
   const bool by_name = settings_->broker.tls;
   const bool try_all = by_name && hosts.size() > 1;
   if (by_name) hosts = {settings_->broker.host};
@@ -176,7 +176,8 @@ void MqttSender::step(MqttClient& client) {
   throw Failure(client.trouble());
 }
 
-// A broker may close the connection instead of refusing a message.
+// Records which topics may have made the broker close the connection: some brokers do this instead of refusing a
+// message.
 void MqttSender::note_lost_connection() {
   std::set<std::string> topics;
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);

@@ -22,7 +22,8 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All arguments must outlive this object. Throws what the constructor of MqttClient throws.
+  /// All arguments must outlive this object. Throws client::Failure or os::Failure if an MQTT client process cannot
+  /// start or cannot use the settings.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Ends the sender thread. A connected broker has one second to receive the remaining messages.
   ~MqttSender();
@@ -93,7 +94,7 @@ class MqttSender {
   mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   Figures figures_;
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

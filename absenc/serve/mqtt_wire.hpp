@@ -15,17 +15,18 @@ namespace absenc::serve {
 /// The kind of a frame, with the fields that follow it.
 enum class Wire : std::uint8_t {
   // Frames to the MQTT client process:
-  begin,    // fields: those of the struct Broker, those of MqttIdentity, then the MQTT version
-  connect,  // fields: host name or address, whether to try all IP addresses of the host
-  publish,  // fields: number of the message, topic, payload, QoS, retain
-  leave,    // no fields; the process disconnects from the broker and ends
+  begin,    // settings; fields: those of the struct Broker, those of MqttIdentity, then the MQTT version
+  connect,  // connects to the broker; fields: host name or address, whether to try all IP addresses of the host
+  publish,  // publishes a message; fields: number of the message, topic, payload, QoS, retain flag
+  leave,    // the process disconnects from the broker and ends; no fields
   // Frames from the MQTT client process:
-  ready,         // no fields; the settings of `begin` can be used
-  failed,        // fields: reason why the settings of `begin` cannot be used
-  connected,     // no fields; the broker has accepted the connection
-  lost,          // fields: reason of the lost connection, whether the broker does not support the MQTT version
-  acknowledged,  // fields: number of the message, reason of a refusal or ""
-  alive,         // no fields; sign of life, every second
+  ready,      // the process can use the settings of the frame `begin`; no fields
+  failed,     // the process cannot use the settings of the frame `begin`; field: the reason
+  connected,  // the broker has accepted the connection; no fields
+  lost,       // the connection to the broker is lost; fields: reason, whether the broker refused the MQTT version
+  // the broker has accepted or refused a message; fields: number of the message, reason of the refusal or ""
+  acknowledged,
+  alive,  // sign of life of the process, sent every second; no fields
 };
 
 /// A frame to be sent, which is built field by field.

@@ -39,8 +39,8 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Requests that an encoder may leave unanswered, for settings or registers: the order succeeds if one of them is
-// answered.
+// Requests for settings or registers, each of which the encoder may leave unanswered. An order that consists of such
+// requests succeeds if the encoder answers at least one of them.
 class OptionalReads {
  public:
   OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}
@@ -63,9 +63,9 @@ class OptionalReads {
     return std::nullopt;
   }
 
-  /// Returns why the last failed request has failed.
+  /// Returns the error of the most recent request that failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// Returns whether the last request was sent: the options of the encoder may not permit it.
+  /// Returns whether the last request was sent; it is not sent if the options of the encoder forbid it.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
   [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
@@ -94,7 +94,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-// Returns a value as JSON text for people; null for an invalid value.
+// Returns a value as a JSON string in words that the page shows; JSON null for an invalid value.
 Json value_for_people(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
@@ -111,8 +111,8 @@ Json row_for_people(const Column& column, const Value& value) {
       .set("meaning", column.meaning);
 }
 
-// Reads settings and identification of the encoder. `wanted`: the only command to run; null: all commands that read
-// one of them.
+// Reads settings and identification of the encoder. `wanted`: the only command to run; null: every command that reads a
+// setting or a part of the identification.
 OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
@@ -139,7 +139,7 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
   return reads.done(json.set("rows", rows).set("failed", failed));
 }
 
-// The value of the register is the last field of the reply.
+// Reads all readable registers. The value of a register is the last field of the reply to its read request.
 OrderResult read_registers(Encoder& encoder, const Between& between) {
   const Command& command = *find_command(encoder.unit(), Verb::memory_read);
   Json registers = Json::array();

@@ -46,8 +46,8 @@ struct Order {
 /// Returns an order that reads settings and identification; if `setting` is not "", only this setting. Throws
 /// UsageError.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
-/// Returns an order that reads registers, or the memory page `page`; a page below 0 means the addresses that a dump
-/// contains. Throws UsageError.
+/// Returns an order that reads all registers if the unit has registers, otherwise the memory page `page`; a page
+/// below 0 means all addresses that `absenc memory dump` reads. Throws UsageError.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
@@ -55,7 +55,8 @@ struct Order {
 /// called between two requests. Throws the exceptions of the encoder, its port and `between`.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
-/// Returns the fields of a reply for people, without Role::exchange, as a list of {"field","value","meaning"}.
+/// Returns the fields of a reply as texts for people, as a list of {"field","value","meaning"}. Fields with the role
+/// Role::exchange are left out.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
 /// Returns what can be read from a unit: {"settings":[names],"memory":[areas],"registers":count}.

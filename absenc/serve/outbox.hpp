@@ -24,8 +24,8 @@ struct OutgoingReading {
   std::optional<std::int64_t> turns{};
 };
 
-/// A bounded queue of readings; when it is full, it drops the oldest reading. Readings may be put only while
-/// `wanted`.
+/// A bounded queue of readings; when it is full, it drops the oldest reading. `put` may be called only while `wanted`
+/// returns true.
 class Outbox {
  public:
   static constexpr std::size_t most = 2048;

@@ -17,7 +17,7 @@ struct MqttSettings {
   std::string prefix{};          // beginning of all MQTT topics, except those of discovery
   std::string spool{};           // path of the folder of the spool
   std::int64_t spool_bytes = 0;  // greatest size of the spool in bytes
-  Time batch{};  // time for which the readings of an encoder are collected into one message, which holds up to 250
+  Time batch{};                  // time for which up to 250 readings of an encoder are collected into one message
   std::string home_assistant{};  // prefix of the discovery topics; "": no discovery
 
   bool operator==(const MqttSettings&) const = default;
@@ -35,8 +35,8 @@ struct Outlets {
   std::optional<UdpSettings> udp{};
 };
 
-/// A command-line option that overrides a setting of absenc.toml, for example "mqtt", "broker",
-/// "mqtts://hall.example".
+/// A command-line option that overrides a setting of absenc.toml. The section "mqtt", the setting "broker" and the
+/// value "mqtts://hall.example" override `broker` in [serve.mqtt].
 struct OutletOption {
   std::string_view section;
   std::string_view setting;

@@ -60,7 +60,7 @@ struct Server::Parts {
     publisher.request_stop();
     publisher.join();
     http.reset();  // the HTTP server ends before the parts that its requests use
-    fleet.end();   // before the events are distributed, so that those of the last commands are included
+    fleet.end();   // ends before `distribute_events`, so that the events of the last commands are distributed, too
     distribute_events();
     sending.change_to({});
   }
@@ -149,7 +149,7 @@ std::string Server::history_trouble() const {
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
-  // the file is read before anything is changed, because reading it may throw
+  // absenc.toml is read before anything is changed, because reading it may throw
   const Outlets outlets = read_outlets(outlets_);
   try {
     parts_->access.reload();

@@ -31,7 +31,8 @@ class Server {
  public:
   /// Starts reading and serving. Throws UsageError, Failure, os::Failure or os::Interrupted.
   explicit Server(const Choices& choices);
-  /// Stops all threads. This may take some seconds, for encoders and a broker.
+  /// Stops all threads. This may take some seconds: running requests to encoders end first, and a connected MQTT broker
+  /// gets the remaining messages.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -161,7 +161,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      // If the file still exists, the error may be temporary, so its messages stay.
+      // A file of the spool cannot be read. If it still exists, the error may be temporary, so its messages stay.
       if (fs::exists(path_of(part.number), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
@@ -229,7 +229,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // A failed write does no harm: the number then stays in the newest file of the spool.
+  // If this write fails, only the number of the encoder's next reading stays in the newest file, which does no harm.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

@@ -67,7 +67,7 @@ class Spool {
 
   struct Dropped {
     Counts counts{};
-    std::string why{};  // why messages were dropped the last time
+    std::string why{};  // why messages were dropped most recently
   };
   /// Returns how many messages were dropped since the last call, and why.
   [[nodiscard]] Dropped take_dropped();
@@ -121,7 +121,7 @@ class Spool {
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
   std::deque<Part> parts_;             // files of the spool, oldest first
-  std::unique_ptr<SpoolFile> newest_;  // file of the last part, to which messages are appended; null if there is none
+  std::unique_ptr<SpoolFile> newest_;  // the last file of `parts_`, which gets new messages; null if none is open
   std::int64_t next_part_ = 1;
   std::size_t part_limit_ = 0;
   std::unique_ptr<SpoolFile> older_;  // the file other than `newest_` from which messages were read last; kept open
@@ -130,7 +130,7 @@ class Spool {
     std::int64_t part = 0, id = 0;
     std::size_t offset = 0;
   } read_position_;             // place at which the last call of `after` stopped reading
-  std::deque<Message> memory_;  // messages that are not on disk; newer than those in `parts_`
+  std::deque<Message> memory_;  // messages that wait for the disk; newer than all messages in files
   Counts memory_counts_{};
   std::int64_t memory_bytes_ = 0;
   std::unordered_map<std::int64_t, Place> places_;

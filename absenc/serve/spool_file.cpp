@@ -101,7 +101,7 @@ std::optional<SpoolFile::StoredMessage> SpoolFile::next(std::size_t& offset, Spo
       if (facts != nullptr && head[kind_at] == kind_forget) facts->next_numbers.erase(fields.text());
       offset = at + head_bytes + size;
     }
-  } catch (const client::Failure&) {  // the body of a record is invalid: no message
+  } catch (const client::Failure&) {  // a record with an invalid body ends the file, like a damaged record
     return {};
   }
 }

@@ -17,7 +17,7 @@
 namespace absenc::serve {
 
 struct Message {
-  std::int64_t id = 0;  // number of the message, which ascends for as long as the spool exists
+  std::int64_t id = 0;  // number of the message; ascends from message to message as long as the spool exists
   std::string topic{};
   std::string payload{};
   std::uint64_t readings = 0;  // number of readings in the message
@@ -28,11 +28,12 @@ struct Message {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }
 
-/// Facts at the beginning of each file of the spool, so that older files can be deleted.
+/// The identity of the spool and the numbers from which it continues. Each file of the spool begins with them, so that
+/// older files can be deleted.
 struct SpoolFacts {
   std::string source{};
   std::int64_t next_id = 1;
-  std::map<std::string, std::uint64_t> next_numbers{};  // next number of a reading, by encoder
+  std::map<std::string, std::uint64_t> next_numbers{};  // number of the next reading, by name of the encoder
 };
 
 [[nodiscard]] std::string spool_record(const Message& message);
@@ -56,7 +57,8 @@ class SpoolFile {
     bool arrived = false;
   };
   /// Returns the next message at or after `offset` and moves `offset` behind it; nothing at the end of the file or at
-  /// a damaged record. `facts`, unless null, collects the facts of the records that are passed. Throws os::Failure.
+  /// a damaged record. Records that contain facts are skipped, and their facts stored in `facts` unless it is null.
+  /// Throws os::Failure.
   [[nodiscard]] std::optional<StoredMessage> next(std::size_t& offset, SpoolFacts* facts) const;
   /// Marks the message at `offset` as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;

@@ -34,7 +34,7 @@ class Sqlite {
   [[nodiscard]] std::int64_t number(const std::string& sql);
   /// Returns whether a transaction is open. SQLite itself may end a transaction after an error.
   [[nodiscard]] bool in_transaction() const;
-  /// Makes closing leave the write-ahead log unchanged.
+  /// Causes the later closing of the database to leave its write-ahead log unchanged.
   void keep_log_on_close();
 
  private:

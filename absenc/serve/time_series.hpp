@@ -19,7 +19,7 @@ struct Point {
   std::optional<client::Estimate> speed{};
 };
 
-/// Number, minimum, maximum and sum of the values within one second.
+/// Number, minimum, maximum and sum of the positions or of the speeds within one second.
 struct Spread {
   std::uint64_t count = 0;
   double least = 0;

@@ -45,7 +45,7 @@ TEST(TimeSeries, CountsErrorsOfLastMinute) {
   EXPECT_EQ(series.errors_last_minute(begin_s + 89), 60u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 99), 50u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 200), 0u);
-  EXPECT_TRUE(series.last_minute().empty());  // no second of the test had a reading
+  EXPECT_TRUE(series.last_minute().empty());  // the list is empty, because the test counted errors only and no reading
 }
 
 TEST(TimeSeries, StoresPointsOnlyWhileTraced) {

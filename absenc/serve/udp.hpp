@@ -25,7 +25,7 @@ class UdpSender {
   const Fleet* fleet_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

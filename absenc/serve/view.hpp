@@ -37,7 +37,7 @@ namespace absenc::serve {
 /// Statistics of the server.
 struct ServerFigures {
   std::size_t streams = 0;
-  std::uint64_t stream_drops = 0;  // number of messages lost by slow clients
+  std::uint64_t stream_drops = 0;  // number of events of event streams that slow clients have lost
   std::uint64_t history_lost = 0;  // number of rows of the history that could not be written
   std::uint64_t wrong_tokens = 0;  // number of requests with a wrong token
 };

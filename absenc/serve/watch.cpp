@@ -204,7 +204,7 @@ void Watch::read_on(const std::stop_token& stop) {
     publish(live, live.next());
     next = pace.next();
   };
-  // Reads the position between two requests of a long order, when a reading is due.
+  // If a reading is due, reads the position between two requests of a long order.
   const auto between = [&] {
     if (os::now() < next) return;
     read();

@@ -68,7 +68,7 @@ struct RaisedAlarm {
 /// A copy of the state of an encoder at one time.
 struct Snapshot {
   State state = State::opening;
-  Time age{};  // age of the last reading; before the first reading, time since the start
+  Time age{};  // age of the last reading; before the first reading, time since the `Watch` was made
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, continued as in `Point`; degrees or mm
   client::Sample last{};          // last reading; current only in state `live`
@@ -76,7 +76,7 @@ struct Snapshot {
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // number of times the continued position was started again
+  std::uint64_t restarts = 0;  // number of times that `place` did not continue from the reading before it
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
   double rate = 0;           // rate of readings, per second
@@ -85,9 +85,9 @@ struct Snapshot {
 
 /// Additional data for the detailed view of one encoder.
 struct Details {
-  std::vector<client::BadExchangeText> bad{};  // bad exchanges of the encoder, newest first
+  std::vector<client::BadExchangeText> bad{};  // recent exchanges with a bad or missing reply, newest first
   client::Json fields{};                       // fields of a recent reply, updated at most once a second
-  client::Json reply{};                        // the reply of `fields` for people, as in `shown_values`
+  client::Json reply{};                        // the same fields as texts for people, as `shown_values` returns them
 };
 
 class Watch {
@@ -171,7 +171,7 @@ class Watch {
   bool restarted_ = false;
   bool command_runs_ = false;  // whether a command runs that must not be interrupted
 
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

@@ -45,7 +45,7 @@ class Worker {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> jobs_;
-  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
+  std::jthread thread_;  // the last member: when the thread starts, all members that it uses exist
 };
 
 }  // namespace absenc::serve

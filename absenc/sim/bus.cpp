@@ -90,7 +90,7 @@ ByteStep Bus::next(Time now) {
 }
 
 Time Bus::first_begin() const {
-  Time first = never - soon;  // far in the future; a caller may add `soon` to it without overflow
+  Time first = never - soon;  // a time in the far future, to which a caller may add `soon` without overflow
   for (const Node& node : nodes_) {
     if (node.send_state == SendState::pending) first = std::min(first, node.at);
   }

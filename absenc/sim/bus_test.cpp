@@ -123,7 +123,8 @@ TEST(Bus, DeliversSameBytesAsLine) {
 
 TEST(Bus, MergesOverlappingTransfersAndSendsTheRestLater) {
   Responder first(1, {0x81, 0x7E});
-  Responder second(1, {0x0F, 0x0F}, 5us + 12us);  // this device starts about one character later than the first one
+  // this device begins its reply about one character later than the first device
+  Responder second(1, {0x0F, 0x0F}, 5us + 12us);
   Responder late(1, {0x77}, 50ms);
   Bus bus({&second, &first, &late}, settings.character());
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);

@@ -11,7 +11,8 @@ namespace {
 /// The bits of a CAN frame that the CRC covers, and the CRC itself, with stuff bits.
 class StuffedBits {
  public:
-  /// Also appends the bits of the frame, with stuff bits, to `bits`, if it is not null.
+  /// Begins a frame without bits. If `bits` is not null, all bits that are appended to the frame, and the stuff bits,
+  /// are appended to `bits`, too.
   explicit StuffedBits(std::vector<bool>* bits) : bits_(bits) {}
 
   /// Appends the lower `count` bits of `value`, most significant first.

@@ -95,14 +95,16 @@ class FaultyDevice final : public Machine<std::uint8_t> {
 
   std::vector<std::uint8_t> request_;  // the first 256 bytes that were received since the last reply
   std::vector<std::uint8_t> reply_;
-  std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
-  bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
+  // bytes of the last received event in the form in which the device got them, perhaps damaged
+  std::vector<std::uint8_t> received_;
+  bool request_damaged_ = false;  // the request was damaged, so the device may answer while the host still sends
   // Whether received bytes are ignored, because the device is sending a changed reply and expects no request.
   bool ignores_line_ = false;
-  Time last_ignored_at_ = -std::chrono::hours(1);  // time at which a byte was last ignored
-  Time device_gap_{};                              // longest `gap` that the device has requested so far
-  Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
-  Time device_timer_ = never;                      // time of the `timer` event that the device has requested
+  // time of the last received byte that was not passed on to the device
+  Time last_ignored_at_ = -std::chrono::hours(1);
+  Time device_gap_{};          // longest `gap` that the device has requested so far
+  Time silent_until_ = never;  // time at which a suppressed reply counts as sent
+  Time device_timer_ = never;  // time of the `timer` event that the device has requested
 };
 
 }  // namespace absenc::sim

@@ -204,7 +204,7 @@ TEST_F(Faults, WholeCharactersOfTwoBytesAreLostOrAdded) {
 
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // the device's `timer` event must still be reported
+  device.timer_at = microseconds(500);  // the device must get its `timer` event although its reply was suppressed
   EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -252,7 +252,7 @@ TEST_F(Faults, DamagedRequestCausesNoViolation) {
   EXPECT_FALSE(device.sending);
 }
 
-// The request at 90 us begins before the repeated reply ends, at 103 us.
+// The host's second request, at 90 us, begins before the repeated reply to the first request ends, at 103 us.
 TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   damage(FaultKind::repeat);
   device.gap = microseconds(15);
@@ -263,7 +263,7 @@ TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   }
   line.run_until(microseconds(1000));
   EXPECT_EQ(device.received.size(), 2u);
-  EXPECT_EQ(exchange().size(), 8u);  // the request after the ignored one is answered again
+  EXPECT_EQ(exchange().size(), 8u);  // the device answers the request that follows the ignored request
 }
 
 TEST_F(Faults, EarlyRequestIsAViolation) {

@@ -102,7 +102,7 @@ class LatePort final : public Port<Item> {
   Time late_{};
   bool received_ = false;
   bool silence_reported_ = false;
-  bool reply_begun_ = false;  // an item was received since the last request
+  bool reply_begun_ = false;  // true: an item was received since the host's last request
 };
 
 }  // namespace absenc::sim::testing

@@ -209,7 +209,7 @@ void Line<Item>::serve(Node node) {
         break;
     }
   }
-  state.due = never;  // the machine is done: no later event wakes it
+  state.due = never;  // the machine is done, so no timer or silence may wake it any more
 }
 
 template <class Item>
@@ -233,6 +233,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.out_bits = step.out_bits;
   state.goes_on = step.goes_on;
+  if (kind_ == LinkKind::clocked_bidirectional && step.rate != 0) state.settings.rate = step.rate;
   state.accepted_at = now_;
   ++state.begin_generation;
   // The begin is scheduled even for the present time, so that a node that is attached after this call still takes part.

@@ -26,7 +26,7 @@ struct Line<Item>::State {
   bool done = false;                 ///< Whether the machine of the node has ended.
 
   Step<Item> waiting{};    ///< last wait step of the machine
-  Time timer_due = never;  ///< time of the `timer` event that the node waits for; `never`: none
+  Time timer_due = never;  ///< time of the `timer` event that the node's machine waits for; `never`: it waits for none
   Silence silence;         ///< Silence timer of the node.
   Time due = never;        ///< time of the next `timer` or `silence` event
 
@@ -44,7 +44,7 @@ struct Line<Item>::State {
   std::vector<Item> out;           ///< items of the transfer that the node sends
   std::size_t bits = 0;            ///< spi, clocked: number of bits of the transfer
   std::size_t frame = 0;           ///< number of items of each frame of `out`; 0: one frame
-  std::size_t expect = 0;          ///< number of items that the node expects
+  std::size_t expect = 0;          ///< number of items that the node's machine expects to receive; 0: unknown, or none
   Time width{};                    ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
   std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
   bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
@@ -60,9 +60,9 @@ struct Line<Item>::State {
   Time lead{};              ///< spi: time from chip select to the first clock
   ExtraWire pulse_wire{};   ///< wire of the pulse
   Time start{};             ///< start of the transfer, or of its present frame
-  std::size_t index = 0;    ///< index of the item of `out` that is being sent, or is sent next
+  std::size_t index = 0;    ///< index in `out` of the item that is being sent or, between two items, is sent next
   std::size_t on_wire = 0;  ///< characters: number of items of the present or last frame of `out`; 0: none
-  Time each{};              ///< duration of one byte
+  Time each{};              ///< duration of one byte on the line
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {

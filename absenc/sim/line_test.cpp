@@ -89,7 +89,7 @@ TEST_F(LineTest, ReplaceAfterDone) {
   line.wake(host_node);
   EXPECT_TRUE(line.done(host_node));
   host.todo = send_two;
-  line.wake(host_node);  // the line does not ask a machine that is done for further steps
+  line.wake(host_node);  // the line asks a machine that has returned `done` for no further steps
   EXPECT_EQ(line.next_event(), never);
   line.replace(host_node, host);
   EXPECT_FALSE(line.done(host_node));
@@ -140,7 +140,7 @@ TEST(FullDuplex, HasOneWirePerDirection) {
   EXPECT_EQ(one.log, "10000 received 20000 sent ");
 }
 
-// A machine that sends one frame when its timer expires, or at a set time.
+// A machine that sends one frame, either when its timer expires or by a step that names the time.
 class CanPuppet final : public Machine<CanFrame> {
  public:
   CanPuppet(std::uint32_t id, Time at, bool by_timer) : frame_{.id = id}, at_(at), by_timer_(by_timer) {}
@@ -168,7 +168,7 @@ class CanPuppet final : public Machine<CanFrame> {
 struct CanLine : testing::Test {
   Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
-  // Returns the log entry of a frame that began `after` us after the start.
+  // Returns the expected log entry of a frame that begins `after` microseconds after the start of the test.
   static std::string seen(std::uint32_t id, std::size_t after) {
     return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
   }

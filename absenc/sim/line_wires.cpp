@@ -13,8 +13,8 @@ namespace absenc::sim {
 
 namespace {
 
-// Returns whether a UART with settings `a` receives characters sent with `b`. It samples the stop bit in its middle, so
-// the rates may differ by 5 %.
+// Returns whether a UART with settings `a` receives characters sent with settings `b`. The UART samples the stop bit in
+// its middle, so the rates may differ by 5 %.
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
@@ -116,7 +116,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // the receiver is synchronised to the character of another sender, and the line is not silent
+    } else {  // a receiver synchronised to another sender's character only notices that the line is not silent
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -184,7 +184,8 @@ void Line<Item>::turn_data_line(Node node) {
 template <class Item>
 void Line<Item>::read_driven_bits(const State& host, std::vector<Item>& in) const {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    const std::size_t first = host.clocks_before + host.out_bits;  // clock of the exchange of the first bit
+    // index of the first bit of `in`, counted in clocks of the whole exchange
+    const std::size_t first = host.clocks_before + host.out_bits;
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;
       const BitView driven{other->out, 8 * other->out.size()};
@@ -202,7 +203,7 @@ void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
     std::vector<Item>& in = transferred_in_;
-    in.assign(host.expect, 0xFF);  // a line that no device drives is pulled up
+    in.assign(host.expect, 0xFF);  // a data line that no device drives is pulled up to 1
     Time low_after{};
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;
@@ -236,6 +237,7 @@ void Line<Item>::end_transfer(Node node) {
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = clocks, .width = period, .lead = host.lead});
     }
     finish(node);
+    if (kind_ == LinkKind::clocked_bidirectional && received_bits == 0) return;
     host.silence.received(now_);
     feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in, .bits = received_bits});
   }

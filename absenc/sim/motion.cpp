@@ -111,7 +111,7 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
   constexpr std::size_t longest_line = 1024;
-  // Greatest number of points of a path: more than one hour with a thousand points per second.
+  // Greatest number of points of a path, enough for more than an hour with a thousand points per second.
   constexpr std::size_t most_knots = 4'000'000;
   Path path;
   std::array<char, longest_line + 1> buffer;

@@ -61,7 +61,8 @@ TEST(Motion, BeginsAtSetTime) {
   motion.begin_at(5s);
   EXPECT_EQ(motion.at(3s).position, 0);
   EXPECT_EQ(motion.at(5s).position, 0);
-  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on when the motion begins starts at rest
+  // a shaft whose motion begins when the encoder is switched on has no speed before
+  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);
   EXPECT_EQ(motion.at(6s).position, revolution);
   EXPECT_EQ(motion.at(6s).speed_millirpm, 60'000);
 }

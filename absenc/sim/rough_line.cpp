@@ -123,6 +123,7 @@ void RoughLine<Item>::exchange_bits(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     using Kind = typename Event<Item>::Kind;
     const Time start = time_;
+    if (step.rate != 0) settings_.rate = step.rate;
     if (!std::exchange(goes_on_, step.goes_on)) {
       clocks_ = driven_from_ = 0;
       out_.clear();
@@ -258,7 +259,7 @@ void RoughLine<Item>::feed(const Event<Item>& event) {
   serve_device();
 }
 
-// Carries out the device's steps until it waits or is done.
+// Carries out the steps of the device's machine until the machine waits or is done.
 template <class Item>
 void RoughLine<Item>::serve_device() {
   while (carry_out(device_.next(time_))) {

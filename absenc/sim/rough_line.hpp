@@ -115,7 +115,7 @@ class RoughLine final : public Port<Item> {
   Random random_;
   RoughRates rates_{};
   RoughCounts counts_{};
-  std::uint64_t skip_ = ~std::uint64_t{0};  // number of undamaged bits before the next flipped bit
+  std::uint64_t skip_ = ~std::uint64_t{0};  // number of bits that still pass undamaged before the next flipped bit
 
   Time time_{};
   Time last_event_at_{};

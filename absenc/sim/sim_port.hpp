@@ -77,11 +77,11 @@ class SimPort final : public Port<Item> {
 
   RealTime real_time_;
   Time start_{};          // time of the caller's clock at which virtual time begins
-  Time last_event_at_{};  // time of the last reported event, or of a later call of `now`
+  Time last_event_at_{};  // time of the last reported event, or of the last call of `now` if this was later
   Line<Item> line_;
   HostEnd host_end_;
   typename Line<Item>::Node host_node_;
-  std::vector<Item> items_;  // items of the event that was returned last
+  std::vector<Item> items_;  // items of the event that `wait` returned last
 };
 
 extern template class SimPort<std::uint8_t>;

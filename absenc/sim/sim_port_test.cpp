@@ -183,7 +183,8 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// The configure step advances the line to the present, which is here later than the requested timer.
+// The configure step advances the line to the present, which is later than the time of the timer that is requested
+// next.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

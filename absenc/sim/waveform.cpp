@@ -154,7 +154,8 @@ void Waveform::transfer(const Line<std::uint8_t>::Transfer& seen) {
     draw_both_ways(seen);
     if (seen.out_bits > 0) comment(seen.start, "host " + std::to_string(seen.out_bits) + " bits " + to_hex(seen.out));
     const std::size_t in_bits = seen.bits - seen.out_bits;
-    const Time turned = seen.start + settings_.bits(seen.out_bits);
+    const EvenDivision bit{seen.start, seen.end - seen.start, static_cast<std::int64_t>(seen.bits)};
+    const Time turned = bit(static_cast<std::int64_t>(seen.out_bits));
     if (in_bits > 0) comment(turned, "device " + std::to_string(in_bits) + " bits " + to_hex(seen.in));
   } else if (kind_ == LinkKind::clocked) {
     draw_clocked(seen);

@@ -87,7 +87,7 @@ class Waveform {
   // The first byte of a character of two bytes, stored until its second byte is on the line.
   struct FirstByte {
     NodeRole sender{};
-    Time start = never;  // `never`: no first byte is stored
+    Time start = never;  // begin of the character; `never`: no first byte is stored
     Time end{};
     std::uint8_t byte = 0;
   };

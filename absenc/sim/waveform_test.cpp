@@ -122,7 +122,7 @@ TEST(Waveform, CommentsListTheItems) {
 
 TEST(Waveform, Character) {
   Picture waveform(LinkKind::half_duplex, slow);
-  waveform.character(NodeRole::host, 5us, 15us, 0x1A);  // bits on the line: 0 01011000 1
+  waveform.character(NodeRole::host, 5us, 15us, 0x1A);  // bits on the line: start bit 0, data bits 01011000, stop bit 1
   EXPECT_EQ(body(waveform),
             "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
             "#25000\n");
@@ -131,7 +131,8 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11, with the parity bit p
+    // bits on the line: start bit 0, data bits 00000001, parity bit, stop bits 11
+    waveform.character(NodeRole::device, 0us, 12us, 0x80);
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
@@ -145,7 +146,7 @@ TEST(Waveform, CollisionIsTheAnd) {
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
-  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // the level changes at every bit
+  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // the line changes its level at every bit of this character
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
     edges += "#" + std::to_string(edge) + '\n';
@@ -184,7 +185,7 @@ TEST(Waveform, SpiClockBeginsAfterSelectLead) {
 
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
-  const std::array<std::uint8_t, 1> bits{0x50};  // the word is the three bits 010
+  const std::array<std::uint8_t, 1> bits{0x50};  // the encoder sends the three bits 010
   at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
@@ -198,8 +199,8 @@ TEST(Waveform, ClockedBits) {
 
 TEST(Waveform, DataLineThatTurns) {
   Picture picture(LinkKind::clocked_bidirectional, slow);
-  const std::array<std::uint8_t, 1> host{0x40};    // the bits 01
-  const std::array<std::uint8_t, 1> device{0x20};  // the bits 001
+  const std::array<std::uint8_t, 1> host{0x40};    // the host sends the bits 01
+  const std::array<std::uint8_t, 1> device{0x20};  // the encoder sends the bits 001
   Line<std::uint8_t>::Transfer first{0us, 5us, 5, host, device};
   first.out_bits = 2;
   first.goes_on = true;
@@ -282,7 +283,7 @@ TEST(Waveform, PassesSettledChangesToSink) {
   device.send({0x55, 0x00, 0x55, 0x00}, 14us);
   line.attach(NodeRole::host, host);
   line.attach(NodeRole::device, device);
-  line.run_until(45us);  // this time lies within the fourth character of both senders
+  line.run_until(45us);  // at this time both senders are sending their fourth character
   EXPECT_EQ(line.settled(), 40us);
   EXPECT_EQ(counter.last, 33us);
   EXPECT_EQ(counter.commented, 30us);

@@ -22,6 +22,7 @@ void set_clock(bool high);  // you write this: sets the level of the clock line 
 struct Axis {
   // The encoder has 19 bits and a clock of 5 MHz. It needs 1 us for a position; its timeout adapts to the clock.
   static constexpr biss::Format format{.ma_khz = 5000, .timeout = biss::Timeout::adaptive(), .latency = 1us};
+  static constexpr Time period = 31'250ns;  // period of the current loop
 
   struct Read {
     Conversation<std::uint8_t>& operator()() { return *new (memory) biss::ReadPosition(format); }
@@ -29,7 +30,7 @@ struct Axis {
   };
   Read read;
   host::CyclicHost<std::uint8_t, Read&> cycles{
-      read, {.period = 50us, .line = biss::line_settings, .carried = biss::unit.services_carry_position}, 50us};
+      read, {.period = period, .line = biss::line_settings, .carried = biss::unit.services_carry_position}, period};
   host::Carrier<std::uint8_t, Axis> carrier{*this};
   std::array<std::uint8_t, 32> samples{};
   std::size_t bytes = 0;
@@ -38,7 +39,7 @@ struct Axis {
   // The carrier calls `hold_clock`, `begin` and `result`. The clock's level in the pause is a bit for the encoder.
   void hold_clock(bool low) { set_clock(!low); }
   void begin(const ByteStep& step) {
-    // the only other step is a change of the clock rate, which is not needed here
+    // besides transfers, the only kind of step is a change of the clock rate, which is not needed here
     if (step.kind != ByteStep::Kind::transfer) return;
     bytes = std::min((step.bits + 7) / 8, samples.size());
     spi_receive(MutableBytes(samples).first(bytes));

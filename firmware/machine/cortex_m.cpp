@@ -68,6 +68,9 @@ void start_clock(Time period) {
   register_at(reload) = counts_of_period - 1;
   register_at(value) = 0;
   register_at(control) = 7;  // SysTick counts the processor clock, and its interrupt is enabled
+  // The counter is 0 until it takes the value of `reload`; `now` would take that for the end of the first period.
+  while (register_at(value) == 0) {
+  }
 }
 
 Time now() {
@@ -78,6 +81,7 @@ Time now() {
   // the counter has restarted, but the interrupt of the tick has not run yet
   if ((register_at(interrupts) & tick_is_pending) != 0) {
     left = register_at(value);
+    if (left == 0) left = counts_of_period - 1;  // the counter is 0 until it takes the value of `reload`
     begin += period_of_ticks;
   }
   asm volatile("msr primask, %0" : : "r"(masked) : "memory");

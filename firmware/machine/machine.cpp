@@ -50,7 +50,7 @@ std::uint32_t argument(unsigned index, std::uint32_t otherwise) {
   } block{text.data(), text.size()};
   if (call_emulator(get_arguments, &block) != 0) return otherwise;
   const char* one = text.data();
-  // skips the arguments before it, and the program's name, which is the first word
+  // skips the program's name, which is the first word, and the arguments before the one with the number `index`
   for (unsigned i = 0; i <= index; ++i) {
     while (*one != ' ' && *one != 0) ++one;
     while (*one == ' ') ++one;

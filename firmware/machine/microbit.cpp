@@ -61,7 +61,8 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late handler finds both events and must handle the end of transmission first.
+  // If the handler runs late, it finds a received byte and the end of a transmission; it must handle the end of the
+  // transmission first.
   const bool has_received = register_at(received) != 0;
   while (register_at(sent) != 0) {
     register_at(sent) = 0;

@@ -29,7 +29,7 @@ void set_alarm(Time delay) {
   register_at(timer_control) = 0;
   register_at(timer_reload) = ~std::uint32_t{0};
   register_at(timer_value) = counts > 0 ? counts : 1;
-  register_at(timer_control) = 9;  // enables the timer and its interrupt
+  register_at(timer_control) = 9;  // bit 0 enables the timer, bit 3 its interrupt
   register_at(set_enable) = 1u << alarm_number;
 }
 
@@ -43,7 +43,7 @@ void handle_alarm() {
 
 void start_uart() {
   register_at(divider) = 16;
-  register_at(control) = 0xF;  // enables transmitter, receiver and the interrupts of both
+  register_at(control) = 0xF;  // bits 0 to 3 enable the transmitter, the receiver and the interrupts of both
   register_at(set_enable) = 1u << receiver_number | 1u << transmitter_number;
 }
 
@@ -53,7 +53,8 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late handler finds both events and must handle the end of transmission first.
+  // If the handler runs late, it finds a received byte and the end of a transmission; it must handle the end of the
+  // transmission first.
   for (;;) {
     const bool has_received = (register_at(state) & receiver_is_full) != 0;
     while ((register_at(pending) & sent_bit) != 0) {

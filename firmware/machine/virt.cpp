@@ -24,7 +24,7 @@ namespace absenc::machine {
   asm volatile(
       ".option push\n"
       ".option norvc\n"
-      ".balign 16\n"  // keeps the three instructions in one page of memory
+      ".balign 16\n"  // the alignment keeps the three instructions in one page of memory
       "slli zero, zero, 0x1f\n"
       "ebreak\n"
       "srai zero, zero, 7\n"

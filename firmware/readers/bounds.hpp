@@ -16,7 +16,7 @@
 
 namespace absenc::firmware {
 
-/// A copy of the items of a reply. The reply must fit into its buffer.
+/// A copy of the bytes or frames of a reply. The reply must fit into its buffer.
 template <class Item>
 class LineContent {
  public:
@@ -67,8 +67,32 @@ void damage(CanFrame& frame, const Visit& visit) {
   frame = sound;
 }
 
-/// Calls `visit` with `reply`, with damaged and truncated copies of it, with further items before and after it, and
-/// with two replies in a row.
+/// Returns the next number of a sequence that is the same in each run, below `limit`.
+inline std::uint32_t random_below(std::uint32_t limit) {
+  static std::uint32_t state = 1;
+  state = state * 1'664'525 + 1'013'904'223;
+  return (state >> 8) % limit;
+}
+
+inline std::uint8_t& byte_of(std::uint8_t& item, std::uint32_t) { return item; }
+inline std::uint8_t& byte_of(CanFrame& frame, std::uint32_t index) { return frame.data[index % frame.data.size()]; }
+
+/// Calls `visit` with copies of `reply` in `line` in which two to nine random bits are inverted.
+template <class Item, class Visit>
+void vary_at_random(LineContent<Item>& line, std::span<const Item> reply, const Visit& visit) {
+  constexpr unsigned copies = 40;
+  const auto size = static_cast<std::uint32_t>(reply.size());
+  for (unsigned copy = 0; copy < copies; ++copy) {
+    line.set(reply);
+    for (std::uint32_t left = 2 + random_below(8); left > 0; --left) {
+      byte_of(line[random_below(size)], random_below(8)) ^= static_cast<std::uint8_t>(1u << random_below(8));
+    }
+    visit();
+  }
+}
+
+/// Calls `visit` with `reply`, with damaged and truncated copies of it, with further bytes or frames before and after
+/// it, and with two replies in a row.
 template <class Item, class Visit>
 void vary(std::span<const Item> reply, const Visit& visit) {
   static LineContent<Item> line;
@@ -78,6 +102,7 @@ void vary(std::span<const Item> reply, const Visit& visit) {
   for (std::size_t size = 0; size < reply.size(); ++size) visit(line.view().first(size));
   for (std::size_t i = 0; i < reply.size(); ++i) damage(line[i], visit_line);
   if (reply.empty()) return;
+  vary_at_random<Item>(line, reply, visit_line);
   for (const Item& extra : {Item{}, reply.front(), reply.back()}) {
     line.set({&extra, 1});
     line.add(reply);

@@ -40,8 +40,8 @@ struct Motion {
   unsigned turns;
   double unit_um;
   Time period;
-  std::uint64_t speed;  // speed in counts per period, times 2^16, modulo 2^64
-  Time open;            // greatest uncertainty of a latch time
+  std::uint64_t speed;  // speed in counts per period, as a fixed-point number with 16 binary places, modulo 2^64
+  Time open;            // greatest uncertainty of the time at which a reading was latched
 };
 
 /// Gives readings of many motions to a part, then ends the emulator.
@@ -56,7 +56,7 @@ template <class Part>
       std::to_array<Time>({microseconds(50), milliseconds(1), milliseconds(70), seconds(9)});
   static constexpr auto speeds =
       std::to_array<std::uint64_t>({0, 99, 0x10000, 0 - std::uint64_t{0x1234'5678}, 1ull << 45});
-  // the uncertainty of the latch time is the period divided by these numbers; 0: no uncertainty
+  // divisors of the period: period divided by divisor is the uncertainty of the latch time; 0: there is no uncertainty
   static constexpr auto uncertainties = std::to_array<std::int64_t>({0, 8, 1});
   static Counted<Part> part;
   std::uint32_t random = 1;
@@ -90,7 +90,7 @@ template <class Part>
 
 #else
 
-/// Measures a part that takes a few readings of a shaft, then ends the emulator.
+/// Gives a few readings of a shaft to a part of absenc/host and measures the part, then ends the emulator.
 template <class Part>
 [[noreturn]] void run() {
   alignas(Part) static std::byte memory[sizeof(Part)];

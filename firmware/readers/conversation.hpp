@@ -18,7 +18,7 @@ extern "C" {
 ABSENC_MARKS(count)  // the plugin prints each count between the marks `count`
 ABSENC_MARKS(feed)   // for the marks `feed`, `next` and `result` the plugin prints only the greatest counts
 ABSENC_MARKS(next)
-ABSENC_MARKS(result)  // from the event that ends a conversation to its result
+ABSENC_MARKS(result)  // the marks `result` enclose the work from the event that ends a conversation to its result
 }
 #undef ABSENC_MARKS
 

@@ -17,7 +17,8 @@
 
 namespace absenc::firmware {
 
-/// Measures a reader, then ends the emulator. `by_character`: also measures single characters.
+/// Measures a reader, then ends the emulator. `by_character`: measures the reader also with a reply that arrives
+/// character by character.
 template <class Item, class Reader, class... Parameters>
 [[noreturn]] void run(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
 #ifdef ABSENC_UNIT

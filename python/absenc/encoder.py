@@ -72,7 +72,7 @@ class Samples:
         try:
             sample = await asyncio.get_running_loop().run_in_executor(self._thread, self._next)
         except asyncio.CancelledError:
-            self._encoder.stop(True)  # ends the wait for a sample in the thread
+            self._encoder.stop(True)  # makes the thread, which waits for the next sample, return at once
             self._thread.shutdown(wait=True)
             self._encoder.stop(False)
             raise

@@ -43,14 +43,14 @@ class Protocol:
         self.id: str = description["id"]
         self.name: str = description["name"]  #: maker and protocol, for people
         self.document: str = description["document"]  #: document that specifies the protocol
-        self.link: str = description["link"]  #: kind of link: "half_duplex", "full_duplex", "exchange" (SPI), "clocked" or "can"
+        self.link: str = description["link"]  #: kind of link: "half_duplex", "full_duplex", "exchange" (SPI), "clocked", "clocked_bidirectional" or "can"
         self.line: str = description["line"]  #: kind of line: "RS-485 half duplex, 2.5 Mbit/s"
         self.options: list[str] = description["options"]
         self.models: list[str] = description["models"]
         self.fields: list[str] = description["fields"]
         self.conditions: list[str] = description["conditions"]  #: names of the conditions of its virtual encoder
         self.flags: list[Flag] = [Flag(*flag) for flag in description["flags"]]  #: flags of all alarm and status fields
-        # if a status flag and an alarm have the same name, the first flag counts
+        # if a status flag and an alarm have the same name, `named` has the one that comes first in `flags`
         named = {flag.name: flag for flag in reversed(self.flags)}
         self.alarms: list[Flag] = [named[name] for name in description["alarms"]]
         self.commands: dict[str, Command] = {

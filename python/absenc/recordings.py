@@ -18,8 +18,8 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # a column with a meaning that begins with these words contains flags
-# content of a cell in CSV if all flags are reported clear; an empty cell means that not all are reported
+FLAG_WORDS = "names, separated by spaces"  # a column whose meaning begins with these words contains names of flags
+# text of a CSV cell for flags of which all are reported as clear; an empty cell means that not all flags were reported
 ALL_CLEAR = "none"
 # value of the attribute `rows` in an HDF5 file while the recording is still being written
 NOT_ENDED = "18446744073709551615"
@@ -141,7 +141,7 @@ def _parse_json_lines(lines: list[str]) -> _Parsed:
     names: list[str] = []
     for name in meanings:
         names.append(name)
-        # only these two columns have a further column that states whether their value is valid
+        # `singleturn` and `multiturn` are the only columns with a further column that states whether the value is valid
         if name in ("singleturn", "multiturn"):
             names.append(name + "_valid")
     for row in rows:

@@ -140,7 +140,8 @@ class Rows {
     return list;
   }
 
-  /// Returns a tuple (values, missing) for each column of the next part; None at the end of the capture.
+  /// Decodes the next rows, up to `most`, and returns a tuple (values, missing) for each column; None at the end of the
+  /// capture.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

@@ -81,7 +81,7 @@ def test_refuses_missing_files_and_unknown_columns(tmp_path):
     with pytest.raises(absenc.AbsencError):
         absenc.decode(tmp_path / "none.sr", "tformat")
     with pytest.raises(absenc.AbsencError):
-        # The exception is raised although no batch has been requested yet.
+        # `decode_batches` raises the exception at once, although no batch of rows has been requested yet.
         absenc.decode_batches(tmp_path / "none.sr", "tformat")
     with pytest.raises(KeyError, match="angle_deg"):
         absenc.decode(TEXT, "tformat")["angel"]
@@ -97,7 +97,8 @@ def test_encodes_and_decodes_frames():
     assert raised.value.sent == "1A"
     assert tformat.flag_names("alarms", 1 << 4) == ["over_heat"]
     with pytest.raises(TypeError):
-        tformat.decode(3)  # a number must not be decoded as three zero bytes
+        # the bytes() of Python would convert the number 3 to three zero bytes, so `decode` must refuse numbers
+        tformat.decode(3)
 
 
 def test_computes_crc_of_bytes_and_arrays():

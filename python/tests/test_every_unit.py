@@ -10,6 +10,8 @@ import pytest
 
 # milliseconds to wait for a reply, because a busy machine may delay it; a test that waits for silence takes this long
 PATIENCE_MS = 500
+# links whose frames are texts: of identifier and data, or of bits
+TEXT_LINKS = ("can", "clocked", "clocked_bidirectional")
 UNITS = sorted(absenc.protocol)
 
 
@@ -20,7 +22,7 @@ def unit(request):
 
 @pytest.fixture
 def address(unit, absenc_emulate):
-    if unit.link in ("exchange", "clocked"):
+    if unit.link in ("exchange", "clocked", "clocked_bidirectional"):
         return f"sim:{unit.id}"
     return absenc_emulate(unit.id).address + f"?latency={PATIENCE_MS}"
 
@@ -66,7 +68,7 @@ def test_encodes_and_decodes_requests(unit):
     # clocked links have no request, because the clock itself requests a position
     assert requests or unit.link == "clocked"
     for request in requests:
-        assert isinstance(request, str if unit.link in ("can", "clocked") else bytes)
+        assert isinstance(request, bytes if unit.link not in TEXT_LINKS else str)
         unit.decode("", request=request)
         if unit.link == "clocked":
             continue  # the request of a clocked link is only a sequence of bits, so none is invalid
@@ -86,7 +88,7 @@ def test_decodes_every_vector(unit):
     done = subprocess.run([os.environ["ABSENC"], "vectors", unit.id, "--json"], check=True, capture_output=True)
     valid, invalid = set(), set()
     for vector in map(json.loads, done.stdout.splitlines()):
-        is_text = unit.link in ("can", "clocked")
+        is_text = unit.link in TEXT_LINKS
         reply, request = (text if is_text else bytes.fromhex(text) for text in (vector["response"], vector["request"]))
         options = dict(vector["options"])
         model = options.pop("model", "")
@@ -106,7 +108,7 @@ def test_decodes_every_vector(unit):
 
 
 def test_reads_alarm_of_virtual_encoder(unit, absenc_emulate):
-    if unit.link in ("exchange", "clocked") or not unit.alarms:
+    if unit.link in ("exchange", "clocked", "clocked_bidirectional") or not unit.alarms:
         pytest.skip("no pseudo-terminal or no alarms")
     virtual = absenc_emulate(unit.id)
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:

@@ -51,7 +51,7 @@ def bad_packet(random_, kind, number):
     if way == 2:  # the bad packet has random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
-    if way == 3:  # the bad packet is truncated, so that the client takes the next packet for its rest
+    if way == 3:  # the bad packet is truncated, so that the client takes the next packet for the end of the bad one
         whole = packet(kind, good + properties(random_))
         return whole[:random_.randrange(1, len(whole))]
     if way == 4:  # the size field of the bad packet is wrong: too large, 256 MB, five bytes long, or 0
@@ -86,12 +86,13 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # Number of good packets before the bad one. If it is 0, the bad packet replaces the CONNACK or follows it.
+        # Number of good packets sent to the client before the bad one. If it is 0, the bad packet replaces the CONNACK
+        # or follows it.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
         self.received = set()  # packet numbers of the messages received from the client
-        self.rest = b""  # last bytes sent to the client that are an incomplete packet
+        self.rest = b""  # begin of a packet to the client whose end was not sent yet
 
     def numbers(self):
         return [*sorted(self.received), NOBODYS]

@@ -210,7 +210,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
   }
 }
 
-/// Checks that a reading with a status flag whose advice is to read the alarms reports at least one raised alarm.
+/// Checks that a reading reports at least one raised alarm if it has a status flag whose advice is to read the alarms.
 template <class Item>
 void check_status(const Unit& unit, const Configuration& configuration, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;

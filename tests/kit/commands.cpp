@@ -9,7 +9,8 @@
 namespace absenc::kit {
 namespace {
 
-/// Returns whether the command must succeed with the options of each model, unless the encoder refuses it.
+/// Returns whether the command is of a kind that must succeed with the options of each model, unless the encoder
+/// refuses it.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;

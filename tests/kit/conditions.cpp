@@ -10,7 +10,7 @@
 namespace absenc::kit {
 namespace {
 
-constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375 turns, in units of 2^-32 turn
+constexpr std::int64_t some_turns = 0x5'6000'0000;  // motion of the shaft: 5.375 turns, in units of 2^-32 turn
 
 /// A virtual encoder with one condition set, and the host that reads it.
 template <class Item>
@@ -52,7 +52,8 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether some command reports different results for two encoders that were treated alike.
+// Returns whether some command reports different results for two encoders of different condition whose shaft, power and
+// memory a test has changed in the same way.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

@@ -4,27 +4,26 @@
 #include <algorithm>
 #include <optional>
 
-#include "absenc/host/cyclic_host.hpp"
 #include "absenc/sim/place.hpp"
+#include "tests/kit/drives.hpp"
 #include "tests/kit/kit.hpp"
-#include "tests/kit/world.hpp"
 
 namespace absenc::kit {
 namespace {
 
 /// Result of a run of cycles, with at most one command as service.
 struct Ride {
-  bool is_over = false;     // whether the service has ended
-  bool is_refused = false;  // whether the service was refused
-  Time needs{};             // time that the refused request would need, in nanoseconds
+  bool is_over = false;     // whether the command has ended or was refused
+  bool is_refused = false;  // whether the command was refused, because its request does not fit between two positions
+  Time needs{};             // time in nanoseconds that this request would need between two positions
   Error error = Error::none;
   ReportedFields seen{};
   unsigned fresh = 0;
   unsigned repeated = 0;
-  unsigned unanswered = 0;  // cycles in which the encoder did not answer
-  unsigned others = 0;      // cycles whose position is neither fresh nor repeated, although the encoder answered
+  unsigned unanswered = 0;  // number of cycles in which the encoder did not answer
+  unsigned others = 0;      // number of answered cycles whose position is neither fresh nor repeated
   std::string other{};      // kind or error of the first cycle counted in `others`
-  unsigned wrong = 0;       // fresh cycles with another position than the shaft's
+  unsigned wrong = 0;       // number of fresh cycles with another position than the shaft's
   std::uint32_t violations = 0;
   std::uint32_t changes = 0;  // number of changes of the encoder's memory
 };
@@ -37,36 +36,25 @@ class Rides {
         configuration_(configuration),
         findings_(findings),
         read_(*find_command(unit, Verb::read)),
-        plan_{.line = line_settings(unit, configuration.options).with_some_rate(),
-              .rest = unit.rest != nullptr ? unit.rest(configuration.options) : Time{},
-              .carried = unit.services_carry_position} {}
+        plan_(plan_for(unit, configuration)) {}
 
-  void run() {
-    World<Item> world(unit_, configuration_.options, 1);
-    if (!world.made()) return;
-    world.move(place);
-    world.run(read_, {});
-    const Time begin = world.line().now();
-    const ConversationResult read = world.run(read_, {});
-    // A drive needs a `read` of one request; configurations whose `read` sends several are left out.
-    if (!read.good() || (read.request_count > 1 && !read.sent.empty())) return;
-    position_time_ = world.line().now() - begin;
-    // While an alarm is raised, `read` may send an additional request.
-    world.device().raise_alarms(~std::uint32_t{0});
-    const Time again = world.line().now();
-    world.run(read_, {});
-    position_time_ = std::max(position_time_, world.line().now() - again);
-    ++runs;
+  /// Runs cycles with each command. Returns false if the configuration is not one of a drive.
+  bool run() {
+    const std::optional<Time> longest = time_of_position<Item>(unit_, configuration_, read_);
+    if (!longest) return false;
+    position_time_ = *longest;
     ride_alone();
     for (const Command& command : unit_.commands) {
       if (is_service(command)) run_service(command);
     }
+    return true;
   }
 
  private:
   [[nodiscard]] static bool is_service(const Command& command) {
     const bool other = command.verb == Verb::read || command.verb == Verb::scan;
-    return !other && command.verb != Verb::config_set;
+    // A setting that changes an option changes the form of the positions, or the address, while the cycles run.
+    return !other && command.changes_option.empty();
   }
 
   void ride_alone() {
@@ -83,15 +71,15 @@ class Rides {
     auto* const made = unit_.host(configuration_.options, command, arguments, storage).template of<Item>();
     if (made == nullptr || made->streams()) return;
     World<Item> alone(unit_, configuration_.options, 1);
-    alone.move(place);
+    alone.move(standing_place);
     alone.run(read_, {});
     const ConversationResult wanted = alone.run(command, arguments);
     if (!wanted.made || !wanted.ended || alone.device().violation_count() != 0) return;
     const auto what = [&](const char* pace) {
       return configuration_.text + ", " + std::string(command.name) + " " + pace + ": ";
     };
-    // If the request of a command is refused, the period of the cycles is extended by the time that it needs. A row
-    // of requests is refused at any period.
+    // If the request of a command does not fit between two positions, the period of the cycles is extended by the time
+    // that the request needs. Requests that must be alone on the line (`Step::holds_line`) are refused at any period.
     plan_.period = 2 * position_time_;
     Ride wide = ride(command, arguments, false);
     for (int i = 0; i < 4 && wide.is_refused && wide.needs < std::chrono::hours(1); ++i) {
@@ -167,7 +155,7 @@ class Rides {
   // Runs cycles until five have ended after the service; without a service, five cycles. Ends after 200 s in any
   // case.
   Ride ride(World<Item>& world, host::Service<Item>* service, bool changes) {
-    world.move(place);
+    world.move(standing_place);
     world.run(read_, {});
     std::vector<std::byte> storage(unit_.host_storage);
     const auto read = [&]() -> Conversation<Item>& {
@@ -206,9 +194,6 @@ class Rides {
     return result;
   }
 
-  // position of the shaft: 4660 turns and about a third, in units of 2^-32 turn
-  static constexpr std::int64_t place = 0x1234'5678'9ABC;
-
   const Unit& unit_;
   const Configuration& configuration_;
   Findings& findings_;
@@ -218,49 +203,26 @@ class Rides {
   std::string rule_;
 
  public:
-  unsigned runs = 0;
   unsigned services = 0;
   unsigned took_cycles = 0;
 };
-
-/// Returns the configurations of the unit's test vectors.
-std::vector<Configuration> configurations_of_vectors(const Unit& unit) {
-  std::vector<Configuration> all;
-  for (const Vector& vector : unit.vectors) {
-    const bool known = std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.text == vector.options; });
-    const std::optional<Options> options = known ? std::nullopt : options_of(unit, vector.options);
-    if (options) all.push_back({std::string(vector.options), *options});
-  }
-  return all;
-}
 
 }  // namespace
 
 Findings check_cycles(const Unit& unit) {
   Findings findings;
-  unsigned runs = 0;
   unsigned services = 0;
   unsigned took = 0;
-  // The configurations of the models are run first; only if `read` is one request in none of them, those of the test
-  // vectors.
-  for (const bool of_models : {true, false}) {
-    for (const Configuration& configuration : of_models ? configurations(unit) : configurations_of_vectors(unit)) {
-      const bool streams = unit.streams != nullptr && unit.streams(configuration.options);
-      if ((of_models && !configuration.is_model) || streams) continue;
-      const auto run = [&](auto rides) {
-        rides.run();
-        runs += rides.runs;
-        services += rides.services;
-        took += rides.took_cycles;
-      };
-      if (unit.link == LinkKind::can) {
-        run(Rides<CanFrame>(unit, configuration, findings));
-      } else {
-        run(Rides<std::uint8_t>(unit, configuration, findings));
-      }
-    }
-    if (runs != 0) break;
-  }
+  for_each_drive(unit, [&](const Configuration& configuration) {
+    const auto run = [&](auto rides) {
+      const bool is_run = rides.run();
+      services += rides.services;
+      took += rides.took_cycles;
+      return is_run;
+    };
+    return unit.link == LinkKind::can ? run(Rides<CanFrame>(unit, configuration, findings))
+                                      : run(Rides<std::uint8_t>(unit, configuration, findings));
+  });
   findings.note(std::to_string(services) + " services, which took " + std::to_string(took) + " cycles");
   return findings;
 }

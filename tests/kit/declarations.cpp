@@ -140,7 +140,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
     const bool is_expected_error = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
     return findings.require(is_expected_error, [&] { return what() + std::string(text_of(request.error()).name); });
   }
-  if (request->empty()) {  // an empty request: only a clocked link sends a request without bytes
+  if (request->empty()) {  // a request without bytes is possible only on a clocked link
     return findings.require(unit.link == LinkKind::clocked, [&] { return what() + "is sent without a byte"; });
   }
   Wire small(request->size() - 1);
@@ -148,11 +148,11 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
                    [&] { return what() + "fits into a buffer that is too small"; });
   ReportedFields seen;
   const Error error = unit.decode(configuration.options, frame_of(unit, *request).frame(), {}, seen);
-  if (error == Error::invalid_argument) return;  // no encoder has these options together
+  if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // It is enough if any field of the request has the argument's value: the field with the argument's name may have
-  // another one.
+  // Any field of the decoded request may have the argument's value: the field with the argument's name may have another
+  // value.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;

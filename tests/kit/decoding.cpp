@@ -77,6 +77,7 @@ class Decoding {
   // Checks that the decoder refuses requests with missing or additional bytes.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
+    const bool has_bits = carries_bits(unit_.link);
     const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
       ReportedFields seen;
       const Error error = unit_.decode(options_, request.frame(), {}, seen);
@@ -86,9 +87,9 @@ class Decoding {
     for (std::size_t size = 1; size < request_.elements(); ++size) {
       const OwnedFrame begin = request_.cut(size);
       const FrameEnd end = unit_.frame_end(options_, Direction::request, begin.bytes);
-      if (end.kind != FrameEnd::Kind::complete) unknown(begin, "cut after " + std::to_string(size));
+      if (has_bits || end.kind != FrameEnd::Kind::complete) unknown(begin, "cut after " + std::to_string(size));
     }
-    unknown(request_.between({}, std::array<std::uint8_t, 1>{0}), "with another byte");
+    if (!has_bits) unknown(request_.between({}, std::array<std::uint8_t, 1>{0}), "with another byte");
   }
 
   void good_reply() {
@@ -105,7 +106,7 @@ class Decoding {
     }
     if (reply_.can) {
       if (!means_nothing) other_frames();
-    } else if (unit_.link != LinkKind::clocked) {
+    } else if (!carries_bits(unit_.link)) {
       refused(reply_.between({}, vector_.reply), [] { return std::string("twice"); });
       ends();
     }

@@ -7,6 +7,7 @@
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/place.hpp"
 #include "tests/kit/changes.hpp"
+#include "tests/kit/exchanges_without_faults.hpp"
 #include "tests/kit/kit.hpp"
 #include "tests/kit/undetected_damage.hpp"
 #include "tests/kit/world.hpp"
@@ -48,10 +49,7 @@ struct Tally {
   std::string violated_rule{};
   /// Counters of the conversations with one command; separate for each configuration that is not a model's.
   struct Command {
-    std::optional<UndetectedDamage> undetected{};
-    std::uint64_t damaged_reply_count = 0;  // number of damaged replies
-    std::uint64_t wrong_positions = 0;      // number of wrong results with a wrong position
-    std::uint64_t wrong_values = 0;         // number of wrong results with a right position and another wrong value
+    DamagedReplies damage{};
     std::uint64_t cost = 0;         // greatest number of exchanges of one run on an undamaged line; 0: not known yet
     std::optional<bool> unchecked;  // whether a reply of the command has no check; empty if not known yet
   };
@@ -94,7 +92,7 @@ class Campaign {
   }
 
  private:
-  /// A command with its results on an undamaged line, by the index of the shaft's position; empty if not recorded.
+  /// A command and, for each position of the shaft, its result on a line without faults; no result if not recorded.
   struct Query {
     const Command* command;
     Values arguments;
@@ -212,15 +210,17 @@ class Campaign {
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
-    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
+    // A damaged request may be another valid one, which has changed the encoder.
+    if (rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
     // If a reply has no check, a host accepts any bytes as the reply, also those of the previous reply.
     const bool unchecked = is_unchecked(query);
     findings_.require(result.damaged != 0 || (unchecked && !faultless_),
                       [&] { return where(query) + wrong.text + ", though no byte was damaged"; });
     if (unchecked) return;
     ++tally_.wrong;
-    Tally::Command& command = tally_.commands[counter_key(query)];
-    ++(wrong.position ? command.wrong_positions : command.wrong_values);
+    DamagedReplies& damage = tally_.commands[counter_key(query)].damage;
+    ++(wrong.position ? damage.wrong_positions : damage.wrong_values);
+    if (damage.example.empty()) damage.example = wrong.text;
   }
 
   // Returns whether the fields `seen` are reported on an undamaged line, too; if so, discards all recorded results.
@@ -300,32 +300,33 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Options that are not a model's are part of the key, because they may select another frame check.
+  // Returns the key of the counters of a command: its name and its options, which
+  // may select another frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
-    return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
+    return std::string(query.command->name) + " " + configuration_.text;
   }
 
   // Counts damaged replies. For each `counter_key`, measures once how many damaged replies the check accepts.
   void measure_check(const Query& query, std::uint64_t damaged) {
-    Tally::Command& command = tally_.commands[counter_key(query)];
-    command.damaged_reply_count += damaged;
-    if (command.undetected) return;
-    command.undetected.emplace();
+    DamagedReplies& damage = tally_.commands[counter_key(query)].damage;
+    damage.count += damaged;
+    if (damage.undetected) return;
+    damage.undetected.emplace();
     for (const auto& [request, reply] : frames_of(query)) {
-      command.undetected->add(measure_undetected_damage(unit_, world_.options(), request, reply, rates_,
-                                                        query.command->verb == Verb::read ? 20'000 : 4'000));
+      damage.undetected->add(measure_undetected_damage(unit_, world_.options(), request, reply, rates_,
+                                                       query.command->verb == Verb::read ? 20'000 : 4'000));
     }
   }
 
-  // Returns whether the command has a reply without a check, in which no bit is covered.
+  // Returns whether the command has a reply in which a frame check covers no bit.
   bool is_unchecked(const Query& query) {
     std::optional<bool>& unchecked = tally_.commands[counter_key(query)].unchecked;
     if (unchecked) return *unchecked;
     const auto frames = frames_of(query);
-    const auto open = [&](const std::pair<OwnedFrame, OwnedFrame>& one) {
+    const auto open = [&](const Exchange& one) {
       if (unit_.is_checked == nullptr) return false;
-      for (std::size_t bit = 0; bit < one.second.bit_count(); ++bit) {
-        if (unit_.is_checked(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
+      for (std::size_t bit = 0; bit < one.reply.bit_count(); ++bit) {
+        if (unit_.is_checked(world_.options(), one.request.frame(), one.reply.frame(), bit)) return false;
       }
       return true;
     };
@@ -333,7 +334,10 @@ class Campaign {
     return *unchecked;
   }
 
-  [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
+  [[nodiscard]] std::vector<Exchange> frames_of(const Query& query) {
+    return exchanges_without_faults<Item>(unit_, configuration_.options, places_[place_], *query.command,
+                                          query.arguments);
+  }
 
   // Counts the rules that the host broke with a model's options.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
@@ -369,63 +373,6 @@ class Campaign {
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns at most four replies to the command, each with its request, from a line without faults.
-template <class Item>
-std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
-  World<Item> world(unit_, configuration_.options, 1);
-  world.move(places_[place_]);
-  std::vector<std::pair<OwnedFrame, OwnedFrame>> frames;
-  bool answering = true;
-  const auto next = [&](bool by_host) {
-    if (by_host && std::exchange(answering, false)) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
-    if (!by_host && frames.empty()) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
-    if (!by_host) answering = true;
-  };
-  world.line().observe([&](std::size_t sender, Time, Time, const Item& item) {
-    const bool by_host = world.line().role(sender) == sim::NodeRole::host;
-    next(by_host);
-    OwnedFrame& frame = by_host ? frames.back().first : frames.back().second;
-    if constexpr (World<Item>::is_can) {
-      frame.can = item;
-    } else {
-      frame.bytes.push_back(item);
-    }
-  });
-  world.line().observe_transfers([&](const typename World<Item>::Line::Transfer& transfer) {
-    if constexpr (!World<Item>::is_can) {
-      const bool clocked = unit_.link == LinkKind::clocked;
-      OwnedFrame reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
-      if (clocked) reply.bits = transfer.bits;
-      OwnedFrame request{.link = unit_.link};
-      if (!clocked) request.bytes.assign(transfer.out.begin(), transfer.out.end());
-      frames.push_back({request, reply});
-    }
-  });
-  (void)world.run(*query.command, query.arguments);
-  std::erase_if(frames, [](const auto& one) { return one.second.empty(); });
-  if (frames.size() > 4) frames.resize(4);
-  return frames;
-}
-
-void judge_undetected_damage(const Tally& tally, Findings& findings) {
-  for (const auto& [name, command] : tally.commands) {
-    if (!command.undetected) continue;
-    const auto judge = [&, &counter_key = name, &all = command](std::uint64_t taken, const DamageCount& share,
-                                                                const char* what) {
-      const std::uint64_t allowed = share.allowed(all.damaged_reply_count);
-      const auto text = [&] {
-        return counter_key + ": of " + std::to_string(all.damaged_reply_count) + " damaged replies " +
-               std::to_string(taken) + " were taken for good with another " + what + "; the check lets " +
-               std::to_string(allowed) + " pass";
-      };
-      findings.require(taken <= allowed, text);
-      if (taken > 0) findings.note(text());
-    };
-    judge(command.wrong_positions, command.undetected->position, "position");
-    judge(command.wrong_values, command.undetected->others, "value");
-  }
-}
-
 template <class Item>
 void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings& findings) {
   const std::vector<Configuration> setups = configurations(unit);
@@ -457,7 +404,7 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
   } else {
     exchange<std::uint8_t>(unit, test, tally, findings);
   }
-  judge_undetected_damage(tally, findings);
+  for (const auto& [name, command] : tally.commands) command.damage.judge(name, findings);
   // Rules are checked only if requests are not damaged: a damaged request may itself break a rule.
   findings.require(tally.rule_violations <= tally.damaged_request_bytes, [&] {
     return "the host broke rules " + std::to_string(tally.rule_violations) + " times, of which " +

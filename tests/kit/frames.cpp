@@ -47,6 +47,13 @@ OwnedFrame OwnedFrame::between(Bytes before, Bytes after) const {
   return longer;
 }
 
+void OwnedFrame::append(BitView more) {
+  for (std::size_t i = 0; i < more.size; ++i, ++bits) {
+    if (bits % 8 == 0) bytes.push_back(0);
+    if (more[i]) bytes.back() = static_cast<std::uint8_t>(bytes.back() | 0x80u >> bits % 8);
+  }
+}
+
 OwnedFrame frame_of(const Unit& unit, Bytes text) {
   OwnedFrame frame{.link = unit.link};
   if (text.empty()) return frame;

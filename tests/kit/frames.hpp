@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/core/bit_view.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "absenc/sim/random.hpp"
 
@@ -28,6 +29,8 @@ struct OwnedFrame {
   [[nodiscard]] std::size_t bit_count() const;
   /// Returns the first `count` elements of this frame as a frame.
   [[nodiscard]] OwnedFrame cut(std::size_t count) const;
+  /// Appends bits to a frame of bits.
+  void append(BitView more);
   /// Returns the frame with one bit inverted, numbered as in `Unit::is_checked`.
   [[nodiscard]] OwnedFrame flipped(std::size_t bit) const;
   /// Returns the frame with additional bytes before and after its own. Only for links that carry bytes.

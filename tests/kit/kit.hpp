@@ -18,7 +18,7 @@ namespace absenc::kit {
 /// Runs commands that send the request of a test vector, and supplies the reply of the vector, whole and damaged.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
-/// Checks how commands end if no encoder answers.
+/// Checks that each command ends, and with which error, if no encoder answers.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
 /// Checks requests with random arguments, and the refusal of wrong arguments.
@@ -48,11 +48,14 @@ namespace absenc::kit {
 /// Checks the wording and the effect of the advice for alarms and errors.
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
-/// Runs each command that changes nothing on an undamaged line, and checks its report.
+/// Runs, on a line without faults, each command that does not change the encoder, and checks the reported fields.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
-/// Runs commands beside the positions of cycles, and checks both.
+/// Runs commands as services beside the cyclic position requests of a drive, and checks the results of both.
 [[nodiscard]] Findings check_cycles(const Unit& unit);
+
+/// Runs cycles while the shaft accelerates and replies are damaged or late, and compares each position with the shaft.
+[[nodiscard]] Findings check_turning(const Unit& unit);
 
 /// Settings of `check_exchanges`, which runs hosts against virtual encoders on a faulty line.
 struct ExchangeTest {

@@ -73,6 +73,12 @@ TEST_P(Kit, CommandsRunBesideCycles) {
   expect_none(findings);
 }
 
+TEST_P(Kit, CyclesFollowTurningShaft) {
+  const Findings findings = check_turning(unit);
+  EXPECT_GT(findings.check_count(), 4u);
+  expect_none(findings);
+}
+
 TEST_P(Kit, DeclarationsNameExistingCommands) { expect_none(check_declarations(unit)); }
 TEST_P(Kit, RequestsContainTheirArguments) { expect_none(check_requests(unit, 1)); }
 TEST_P(Kit, DeclaredStorageSuffices) { expect_none(check_storage(unit)); }

@@ -28,7 +28,7 @@ std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned
   return value;
 }
 
-/// Checks the bit positions that a unit states for the fields of its frames, one frame after the other.
+/// Checks, frame by frame, the bit positions that a unit states for the fields of each frame.
 class Places final : public FieldSink {
  public:
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}

@@ -19,8 +19,8 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// A function that returns the reply to the request under test, in pieces. `clocks`: number of clocks of the host;
-  /// 0 if unknown.
+  /// A function that returns the reply to the request under test, in pieces. `clocks`: number of bits that the host
+  /// clocks for the reply; 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
   /// Creates a player without a virtual encoder: only the request under test gets a reply.
@@ -52,14 +52,15 @@ class Player {
         continue;
       }
       const std::vector<Item> sent(step.out.begin(), step.out.end());
-      const std::size_t clocks = step.bits != 0 ? step.bits : step.expect;
+      const std::size_t clocks = step.bits != 0 ? step.bits - step.out_bits : step.expect;
       now_ = std::max(now_, step.at);
       conversation.feed({.kind = Kind::sent, .at = now_});
       ++request_count_;
       const bool tested = sent == request;
       if (tested) ++tested_requests_;
       unsolicited = false;
-      play(conversation, tested ? reply(clocks) : Pieces{ask_device(sent)});
+      if (step.out_bits != 0) ask_bits(step);
+      play(conversation, tested ? reply(clocks) : Pieces{step.bits == 0 ? ask_device(sent) : answered_bits(clocks)});
     }
     return false;
   }
@@ -74,7 +75,7 @@ class Player {
       if (piece.empty()) continue;
       now_ += std::chrono::microseconds(1);
       if (conversation.next(now_).kind != Step<Item>::Kind::wait) return;
-      conversation.feed({.kind = Event<Item>::Kind::received, .at = now_, .items = piece});
+      conversation.feed({.kind = Event<Item>::Kind::received, .at = now_, .items = piece, .bits = 8 * piece.size()});
     }
   }
 
@@ -88,7 +89,28 @@ class Player {
     return reply;
   }
 
+  // Gives the host's bits of an exchange on a bidirectional clocked link to the virtual encoder.
+  void ask_bits(const Step<Item>& step) {
+    answer_.clear();
+    if (device_ == nullptr) return;
+    device_->feed({.kind = Event<Item>::Kind::selected, .at = now_});
+    device_->feed({.kind = Event<Item>::Kind::received, .at = now_, .items = step.out, .bits = step.out_bits});
+    const Step<Item> answer = device_->next(now_);
+    if (answer.kind == Step<Item>::Kind::transfer) answer_.assign(answer.out.begin(), answer.out.end());
+    device_->feed({.kind = Event<Item>::Kind::sent, .at = now_, .bits = step.bits});
+    now_ += std::chrono::milliseconds(1);
+  }
+  // Returns the bits of the virtual encoder that the host clocks; nobody drives the line behind them.
+  std::vector<Item> answered_bits(std::size_t clocks) {
+    std::vector<Item> bits((clocks + 7) / 8);
+    for (std::size_t i = 0; i < bits.size(); ++i) {
+      if constexpr (std::is_same_v<Item, std::uint8_t>) bits[i] = i < answer_.size() ? answer_[i] : Item{0xFF};
+    }
+    return bits;
+  }
+
   Time now_{};
+  std::vector<Item> answer_;  // bits of the virtual encoder's last answer on a bidirectional clocked link
   Still still_;
   std::vector<std::byte> device_storage_;
   Device<Item>* device_ = nullptr;

@@ -8,7 +8,8 @@
 namespace absenc::kit {
 namespace {
 
-/// Flags of one channel of a reading: `bits` are the set ones, `reported` those that the reply contains.
+/// Flags of one channel of a reading: `bits` has the bits of the flags that are set, `reported` those of all flags that
+/// the reply contains.
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;

@@ -136,7 +136,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // the largest storage size that the unit has refused, of those tried
+  std::size_t none = 0;  // the largest of the tried storage sizes that the unit has refused as too small
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {

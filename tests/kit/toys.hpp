@@ -16,14 +16,14 @@ enum class Mistake : std::uint8_t {
   accepts_two_bytes,  // the host takes the first two bytes it receives for the reply
   ignores_checksum,   // the host ignores the checksum
   accepts_excess,     // the host accepts bytes that begin with a good reply, and leaves the excess for the next command
-  reports_nothing,    // the host reports no field
-  has_no_request,     // `encode` fails
+  reports_nothing,    // the host reports no field of a good reply
+  has_no_request,     // `encode` fails for every command
   unread_vectors,     // no command sends the request of the vectors
   stale_reply,        // the virtual encoder returns the position of the previous request
   wrong_position,     // the virtual encoder's position is one count too high
   needs_more_storage,       // `host_storage` is smaller than the host needs
   overflows_storage,        // the host is constructed even if the storage is too small
-  ignores_last_byte,        // `decode` ignores the last byte
+  ignores_last_byte,        // `decode` ignores the last byte of a frame
   differs_among_many,       // the decoder of many frames refuses a good frame
   wrong_bit_positions,      // the stated bit positions of the position field cover only a part of its bits
   ignores_condition,        // the virtual encoder ignores its condition

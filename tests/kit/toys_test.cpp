@@ -184,10 +184,10 @@ TEST(KitToys, FindsAcceptedSurplusArguments) {
   EXPECT_THAT(texts, Contains("position 0: has a conversation"));
 }
 
-// The toy has three models with the same configuration, and a second configuration with another option. Every other
-// round is for models only.
+// The toy has three models with the same configuration, and a second configuration with another value of its option.
+// Every second round uses only configurations of models.
 TEST(KitToys, PrefersConfigurationsOfModels) {
-  static std::map<std::int64_t, unsigned> made;  // number of virtual encoders made with each value of the option
+  static std::map<std::int64_t, unsigned> made;  // number of virtual encoders created, by value of the option "kind"
   constexpr std::array<OptionValue, 1> values{{{0, 2}}};
   constexpr std::array<Option, 1> options{
       {{.name = "kind", .meaning = "", .default_value = 2, .minimum = 1, .maximum = 2}}};

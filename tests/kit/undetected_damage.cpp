@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Whether the position that was decoded from a damaged reply is wrong, and whether other fields are.
+/// States whether the position that was decoded from a damaged reply is wrong, and whether other fields are wrong.
 struct WrongValues {
   bool position = false;
   bool others = false;
@@ -76,6 +76,22 @@ struct Judge {
 };
 
 }  // namespace
+
+void DamagedReplies::judge(const std::string& command, Findings& findings) const {
+  if (!undetected) return;
+  const auto judge_kind = [&](std::uint64_t accepted, const DamageCount& share, const char* what) {
+    const std::uint64_t allowed = share.allowed(count);
+    const auto text = [&] {
+      return command + ": of " + std::to_string(count) + " damaged replies " + std::to_string(accepted) +
+             " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) +
+             " pass; the first: " + example;
+    };
+    findings.require(accepted <= allowed, text);
+    if (accepted > 0) findings.note(text());
+  };
+  judge_kind(wrong_positions, undetected->position, "position");
+  judge_kind(wrong_values, undetected->others, "value");
+}
 
 UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options, const OwnedFrame& request,
                                            const OwnedFrame& reply, const sim::FaultRates& rates, unsigned samples) {

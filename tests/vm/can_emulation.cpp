@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Virtual encoder of the library on CAN, for can_test.py. Usage: can_emulation INTERFACE
+// Program for can_test.py that runs a virtual encoder of the library on a CAN interface. Usage: can_emulation INTERFACE
 #include <cstdio>
 #include <string>
 #include <vector>

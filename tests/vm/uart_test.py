@@ -17,12 +17,13 @@ from command_support import Emulator, EncoderCase, absenc, end, json_lines
 from tap_support import Relay, TapCase, joined
 
 PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
-REGISTERS = 0x2F8  # I/O address of the registers of the UART behind PORT
+REGISTERS = 0x2F8  # I/O address of the registers of the UART whose device is PORT
 CLOCK = 115200  # baud rate of the UART with a divisor of 1
 NOBODY = 65534
 PARITY = termios.PARENB | termios.PARODD
 
-# From <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h>, <linux/tty_flags.h>
+# Constants and a struct of Linux, from <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h> and
+# <linux/tty_flags.h>
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
 TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
 SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
@@ -223,7 +224,7 @@ class Uart(EncoderCase):
 
 class TapOnUart(TapCase):
     COUNT = 300
-    BAUD = 57600  # a baud rate that both protocols support
+    BAUD = 57600  # a baud rate that both T-format and the Modbus of RAA38 support
 
     def test_shows_every_exchange(self):
         """tap must show every exchange of the known bytes on the line."""

@@ -114,7 +114,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  // If the encoder's options leave out the flag of an alarm, this alarm can be lowered, but not raised.
+  // With some options an encoder cannot report an alarm. Such an alarm can be lowered here, but not raised.
   const std::uint32_t bits = raise ? require_alarms(unit_, device.options(), all) : require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));

@@ -38,7 +38,7 @@ class Console {
   const Unit& unit_;
   std::vector<VirtualDevice*> devices_;
   os::InputLines lines_;
-  bool unheard_ = false;  // standard output was found closed, so nobody reads the answers
+  bool unheard_ = false;  // whether standard output was found closed, so that nobody reads the answers
 };
 
 }  // namespace absenc::tool

@@ -63,9 +63,10 @@ class Annotator {
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    // false: no pause was seen yet, so a run that ends is reported as cut (unused with arrival times)
+    // false: no pause was seen yet, so the first run may begin within a frame and is reported as cut (unused with
+    // arrival times)
     bool synchronised = false;
-    bool at_frame_start = false;  // the next character to parse is taken as the begin of a frame
+    bool at_frame_start = false;  // true: the next character to parse is taken as the begin of a frame
     // size of the last good unsolicited frame of this run; with arrival times a reply sets it to 0
     std::size_t last_size = 0;
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none
@@ -118,8 +119,9 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256> reply_sizes_{};  // usual size of a reply, by the index of its request; 0: not known
-  std::vector<Character> undecided_;            // characters stored until the channels' directions are known
+  // usual size in bytes of the reply to each request, by the hash of the request's first two bytes; 0: not known
+  std::array<std::size_t, 256> reply_sizes_{};
+  std::vector<Character> undecided_;  // characters stored until the channels' directions are known
 
   bool is_first_ = true;  // no frame was parsed yet: the capture may have begun within a frame or exchange
 

@@ -129,7 +129,7 @@ TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
     const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
     receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
     at += size;
-    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses of 5 * gap, many of them within a frame
+    now += random.below(10) == 0 ? 5 * gap : 1;  // a pause of 5 * gap follows one piece in ten, often within a frame
   }
   annotator->report_after_silence();
   EXPECT_EQ(difference(good(), exchanges), "");

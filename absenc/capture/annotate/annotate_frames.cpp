@@ -28,7 +28,9 @@ void BurstAnnotator::put(const Burst& burst) {
   if (burst.bits == 0) return;
   if (control_.settle(burst.fell_before)) sink_.put(control_.annotation(judge_));
   Annotation annotation{.kind = Annotation::Kind::reply, .begin = burst.begin, .end = burst.end};
-  if (judge_.unit().link == LinkKind::clocked) {
+  if (judge_.unit().link == LinkKind::clocked_bidirectional) {
+    decode_both_ways(burst, annotation);
+  } else if (judge_.unit().link == LinkKind::clocked) {
     decode_word(burst, annotation);
   } else {
     decode_exchange(burst, annotation);
@@ -140,6 +142,78 @@ void BurstAnnotator::decode_exchange(const Burst& burst, Annotation& annotation)
     annotation.error = Error::none;
   }
   if (burst.bits % 8 != 0) annotation.error = Error::bad_framing;
+}
+
+namespace {
+
+/// A sequence of bits that grows, packed like those of a Burst.
+void append_bit(std::vector<std::uint8_t>& bytes, std::size_t& count, bool bit) {
+  if (count % 8 == 0) bytes.push_back(0);
+  if (bit) bytes.back() = static_cast<std::uint8_t>(bytes.back() | 0x80u >> count % 8);
+  ++count;
+}
+void set_bit(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
+  const auto mask = static_cast<std::uint8_t>(0x80u >> bit % 8);
+  bytes[bit / 8] = static_cast<std::uint8_t>(level ? bytes[bit / 8] | mask : bytes[bit / 8] & ~mask);
+}
+bool bit_of(const std::vector<std::uint8_t>& bytes, std::size_t bit) {
+  return bit / 8 < bytes.size() && (bytes[bit / 8] >> (7 - bit % 8) & 1) != 0;
+}
+
+}  // namespace
+
+// The first sample of a burst is the idle level before the first clock; the last bits follow behind the last one.
+void BurstAnnotator::decode_both_ways(const Burst& burst, Annotation& annotation) {
+  annotation.kind = Annotation::Kind::exchange;
+  line_.clear();
+  std::size_t bits = 0;
+  for (std::size_t i = 1; i < burst.bits; ++i) append_bit(line_, bits, bit_of(burst.in, i));
+  if (burst.has_last) append_bit(line_, bits, burst.last);
+  for (unsigned i = burst.tail_bits; i-- > 0;) append_bit(line_, bits, (burst.tail >> i & 1) != 0);
+  if (!burst.out.empty()) take_host_wire(burst, bits);
+  const BitRanges ranges = judge_.host_bits({.bytes = line_, .bits = bits});
+  const auto is_of_host = [&](std::size_t bit) {
+    return std::any_of(ranges.view().begin(), ranges.view().end(),
+                       [bit](const BitRange& range) { return bit >= range.first && bit - range.first < range.count; });
+  };
+  request_.clear();
+  reply_.clear();
+  std::size_t request_bits = 0;
+  std::size_t reply_bits = 0;
+  for (std::size_t i = 0; i < bits; ++i) {
+    if (is_of_host(i)) {
+      append_bit(request_, request_bits, bit_of(line_, i));
+    } else {
+      append_bit(reply_, reply_bits, bit_of(line_, i));
+    }
+  }
+  annotation.request = {.bytes = request_, .bits = request_bits};
+  annotation.reply = {.bytes = reply_, .bits = reply_bits};
+  annotation.error = judge_.decode(annotation.request, annotation.reply);
+}
+
+// Replaces the bits of the host by those of its own wire. Without a direction wire the unit tells which these are:
+// first by the host's wire alone, on which the mode command is, then by both.
+void BurstAnnotator::take_host_wire(const Burst& burst, std::size_t bits) {
+  if (!burst.direction.empty()) {
+    for (std::size_t i = 0; i < bits; ++i) {
+      if (bit_of(burst.direction, i + 1)) set_bit(line_, i, bit_of(burst.out, i + 1));
+    }
+    return;
+  }
+  request_.clear();
+  std::size_t count = 0;
+  while (count < bits) append_bit(request_, count, bit_of(burst.out, count + 1));
+  for (Frame known{.bytes = request_, .bits = bits}; const int round : {0, 1}) {
+    const BitRanges ranges = judge_.host_bits(known);
+    const std::size_t used = round == 0 ? std::min<std::size_t>(1, ranges.size()) : ranges.size();
+    for (const BitRange& range : ranges.view().first(used)) {
+      for (std::size_t i = range.first; i < std::min(range.first + range.count, bits); ++i) {
+        set_bit(line_, i, bit_of(burst.out, i + 1));
+      }
+    }
+    known.bytes = line_;
+  }
 }
 
 // ---- CAN

@@ -72,13 +72,19 @@ class BurstAnnotator {
 
  private:
   void decode_exchange(const Burst& burst, Annotation& annotation);
+  void decode_both_ways(const Burst& burst, Annotation& annotation);
+  void take_host_wire(const Burst& burst, std::size_t bits);
   Error decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered);
   void decode_word(const Burst& burst, Annotation& annotation);
   [[nodiscard]] Frame word_of(const Burst& burst, bool with_last);
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;  // storage of a word whose bits are shifted against those of its burst
+  // storage of bits in both directions, of those of the host, and of those of the encoder
+  std::vector<std::uint8_t> line_;
+  std::vector<std::uint8_t> request_;
+  std::vector<std::uint8_t> reply_;
+  std::vector<std::uint8_t> shifted_;  // storage of a word whose bits are not exactly the bits of its burst
   // storage of the last word, with the encoder's control communication bit set to 0
   std::vector<std::uint8_t> silenced_;
   ControlFrames control_;

@@ -222,7 +222,7 @@ class Truth {
 
 // ---- Comparison of found and expected annotations
 
-// Of the bad exchanges only a `share` must match exactly, because several faults together may look like another fault.
+// Only a `share` of the bad exchanges must match exactly, because several faults together may look like another fault.
 void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
                  double share = 1) {
   std::size_t next = 0;

@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of characters to look ahead: more than two frames of usual length
+// number of characters that are examined beyond a frame to judge it: more than two frames of usual length
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -89,7 +89,8 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : take_bad();
 }
 
-// Returns the index of the newest outstanding request that ended by `begin`, or nothing.
+// Returns the index of the newest outstanding request that ended at the tick `begin` or earlier; nothing if there is
+// none.
 std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
@@ -157,7 +158,7 @@ bool Annotator::is_refusal(Bytes request, std::size_t from) {
          judge_.decode({.bytes = request}, {.bytes = bytes}) == Error::request_rejected;
 }
 
-// Returns the size of an echo of `request` at index `from` together with the reply or refusal after it, or 0 if there
+// Returns the total size of an echo of `request` at index `from` and the reply or refusal behind the echo; 0 if there
 // is no echo.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
@@ -267,7 +268,7 @@ std::size_t Annotator::bad_size() {
   // In a stream of unsolicited frames a bad frame mostly has the size of the good frames.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // If the run ends with a good unsolicited frame, the bytes before it are the bad ones.
+  // If the run ends with a good unsolicited frame, all bytes before this frame are the bad ones.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;
@@ -282,7 +283,7 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
-  // A damaged reply may still have its usual length, with a pause after it.
+  // A damaged reply may still have the usual length of a reply to this request, with a pause after it.
   if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
     const std::size_t usual = reply_sizes_[size_index(exchanges_.waiting()[*pending].bytes())];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {

@@ -115,7 +115,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   settings.ticks = {.pause = length / 2, .character = length};
   for (std::size_t from = 0; from < 2 * sizes[0]; ++from) {
     std::vector<Character> seen(characters.begin() + static_cast<std::ptrdiff_t>(from), characters.end());
-    // more characters than a run can hold: only then it is clear that the line never pauses
+    // more characters than a run can hold, because only then the annotator knows that the line never pauses
     while (seen.size() <= Run::capacity) {
       const Tick behind = seen.back().end - characters.front().begin;
       for (Character character : characters) {
@@ -297,7 +297,8 @@ TEST(Can, NodesAnswerInAnyOrder) {
   CanAnnotator annotator(unit, {}, {.limit = 1000}, collector);
   annotator.put(record(0, 0x201, 7));
   annotator.put(record(10, 0x202, 8));
-  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2: it is not the reply to the request before
+  // an unsolicited frame of node 2, which is not the reply to the request sent before
+  annotator.put(record(20, 0x102, 9));
   annotator.put(record(30, 0x102, 8));
   annotator.put(record(40, 0x101, 7));
   annotator.put(record(50, 0x333, 0));

@@ -51,7 +51,7 @@ class CompletedReadings final : public AnnotationSink {
  private:
   static constexpr std::size_t longest_request = 64;
 
-  // Stores the alarms of each encoder that the reply reports.
+  // Stores the alarms that a reply reports, for each encoder in this reply.
   void take_alarms(const Contents& contents) {
     std::int64_t address = 0;
     for (const FieldValue& field : contents.fields) {

@@ -99,7 +99,7 @@ class Talker {
     return std::move(record_);
   }
 
-  /// Draws all further traffic to `waveform`, which must outlive this object.
+  /// Draws all items that host and encoder send from now on to `waveform`, which must outlive this object.
   void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
 
   [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }
@@ -117,7 +117,7 @@ class Talker {
       for (const Transmission& one : record_.transmissions)
         record_.collided = record_.collided || (one.by != by && one.end > begin);
     }
-    // If a request is sent in frames, there are pauses between them.
+    // If a request is sent in several frames, the host pauses between these frames.
     const Tick pause = by == sim::NodeRole::host ? static_cast<Tick>(unit_.timing.frame_pause.count()) : 0;
     const bool is_newest = last == record_.transmissions.rbegin();
     const bool goes_on =

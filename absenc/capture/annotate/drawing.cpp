@@ -128,7 +128,8 @@ class Samples {
 
   const std::size_t size;  // size of a sample in bytes
   const std::uint64_t count;
-  std::exception_ptr exception{};  // exception that ended the computation of samples; null: none
+  // exception that ended the computation of samples early; null: no exception was thrown
+  std::exception_ptr exception{};
 
  private:
   // Returns the index of the first sample that is not before `time`.
@@ -157,7 +158,7 @@ class Samples {
   std::uint8_t packed_[8]{};
 };
 
-/// One part of the samples, which is one file in the sigrok archive.
+/// A part of the drawing's samples, which becomes one file in the sigrok archive.
 struct SamplesPart {
   Samples* samples;
   std::uint64_t size;  // number of bytes in this part of the samples

@@ -30,7 +30,7 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// Decodes a request and its reply, and returns the error; see `contents`.
+  /// Decodes a request and its reply, stores what `contents` returns, and returns the error of decoding.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
     const Error error = decoder_ != nullptr ? decoder_->decode(request, reply, decoded_)
@@ -62,6 +62,9 @@ class Judge {
   [[nodiscard]] std::optional<std::size_t> control_bit(const Frame& reply) const {
     return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
+
+  /// Returns the ranges of bits of a burst that the host sends; see Unit::host_bits.
+  [[nodiscard]] BitRanges host_bits(const Frame& burst) const { return unit_->host_bits(options_, burst); }
 
   [[nodiscard]] bool is_answered(const Frame& request) const {
     return unit_->is_answered == nullptr || unit_->is_answered(options_, request);

@@ -146,7 +146,8 @@ TEST_P(WholeWay, EqualsDirectAnnotation) {
   talker.draw(waveform);
   std::vector<Character> all;
   const unsigned least = test_cases(300);
-  // Some commands send few or no characters, so more of them are run.
+  // A command may send few or no characters, so further commands are run until there is an expected annotation or there
+  // are 1200 characters.
   for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {
     const TalkRecord talk = talker.talk();
     ASSERT_FALSE(talk.collided);

@@ -69,16 +69,18 @@ TEST(Candump, TimesOfAllKinds) {
   };
   using Ticks = std::vector<Tick>;
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.025000)  c  001   [0]\n"),
-            (Ticks{0, 10'000'000, 25'000'000}));  // `candump -t z` prints such times, from the first frame on
+            // `candump -t z` prints these times, which count from the first frame on
+            (Ticks{0, 10'000'000, 25'000'000}));
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.005000)  c  001   [0]\n"),
-            (Ticks{0, 10'000'000, 15'000'000}));  // `candump -t d` prints such times, from frame to frame
+            // `candump -t d` prints these times, each counted from the previous frame
+            (Ticks{0, 10'000'000, 15'000'000}));
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.010000)  c  001   [0]\n"),
             (Ticks{0, 10'000'000, 20'000'000}));
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.010000)  d  001   [0]\n"),
             // the last two frames are of different interfaces, so the times may be equal
             (Ticks{0, 10'000'000, 10'000'000}));
   EXPECT_EQ(times(" (2026-11-21 17:55:24.000001)  c  001   [0]\n (2026-11-21 17:55:25.000000)  c  001   [0]\n"),
-            (Ticks{0, 999'999'000}));  // `candump -t A` prints such times, with the date
+            (Ticks{0, 999'999'000}));  // `candump -t A` prints these times, which include the date
 }
 
 TEST(Candump, NotesFramesLeftOut) {

@@ -106,7 +106,7 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    // annotations of other classes than data contain no bytes
+    // annotations of sigrok classes other than data (start bit, stop bit ...) contain no bytes
     if (kind != "rx-data:" && kind != "tx-data:") return true;
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;

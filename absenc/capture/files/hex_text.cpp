@@ -40,7 +40,7 @@ class HexTextReader final : public ParsedReader {
     const std::optional<HexForm> form = first_form(line);
     if (!form) throw OpenError(std::string(name) + " holds no bytes as text");
     form_ = *form;
-    // A decoder may print other annotations before the first line with bytes.
+    // A sigrok decoder may print annotations without bytes before the first line with bytes.
     constexpr std::uint64_t far_enough = 1 << 16;
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;

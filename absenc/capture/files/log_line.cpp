@@ -58,7 +58,7 @@ bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    // each UTF-8 sequence in the text counts as one character
+    // each character of the text, even of several bytes in UTF-8, stands for one logged byte
     if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
@@ -114,14 +114,14 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
 
 struct ParsedTime {
   std::optional<Instant> at;
-  std::size_t size = 0;  // number of characters of the line that state the time
+  std::size_t size = 0;  // number of characters at the beginning of the line that state the time
 };
 
 // Returns the number of characters at the beginning of `text` that may be a clock time like "17:55:24.123".
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
-  // A comma begins a fraction only before three or six digits.
+  // A comma after the seconds begins a fraction of a second only if three or six digits follow.
   if (seconds && text.substr(size).starts_with(',')) {
     const std::string_view behind = text.substr(size + 1);
     const std::size_t digits = std::min(behind.find_first_not_of("0123456789"), behind.size());

@@ -85,7 +85,7 @@ class LogicCsv final : public ParsedReader {
     levels_->begin(block);
     const std::uint64_t begin = lines_.offset();
     const Tick first = at_;
-    // All level changes of one time must be in one block.
+    // Level changes with the same time must be in the same block.
     Tick last = first;
     do {
       if (at_ != last && lines_.offset() - begin >= text_at_once) {
@@ -241,7 +241,8 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<char> columns_;  // use of each column that is not skipped as time: 1 has logic levels, 0 is left out
+  // for each column except that of the time: 1 if it has the levels of a channel, 0 if it is left out
+  std::vector<char> columns_;
   RowTime clock_ = RowTime::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;

@@ -14,14 +14,16 @@ namespace absenc::capture {
 
 namespace {
 
-// These numbers are from PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.4.9 and 4.5.3, except `largest_directory`.
+// The constants below are from PKWARE's APPNOTE 6.3.10 (description of the zip format), 4.3.7 to 4.4.9 and 4.5.3,
+// except `largest_directory`.
 constexpr std::uint64_t local_signature = 0x04034B50;
 constexpr std::uint64_t directory_signature = 0x02014B50;
 constexpr std::uint64_t zip64_end_signature = 0x06064B50;
 constexpr std::uint64_t zip64_locator_signature = 0x07064B50;
 constexpr std::uint64_t end_signature = 0x06054B50;
 constexpr std::size_t local_bytes = 30;
-constexpr std::uint64_t size_behind = 1 << 3;   // flag of an entry whose sizes are stored after its data
+// flag in the header of an entry: the sizes of the data are stored after the data
+constexpr std::uint64_t size_behind = 1 << 3;
 constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size field if the real size is in the zip64 extra field
 constexpr std::uint64_t zip64_version = 45;
 constexpr std::size_t largest_directory = 1 << 26;

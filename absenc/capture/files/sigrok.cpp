@@ -306,7 +306,8 @@ class SigrokReader final : public Reader {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // Returns how many bytes are missing at offset `bytes` until the sample is complete.
+  // Returns how many bytes follow the offset `bytes` in the sample that lies at this offset; 0 if a sample begins
+  // there.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }

@@ -183,7 +183,7 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    // the archive contains the name twice: in front of the piece and in the directory
+    // the archive contains the name of the piece twice: in front of the piece and in the directory
     constexpr std::string_view name = "logic-1-7";
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
     *(in_directory - 30) ^= 1;  // changes a byte of the piece's checksum
@@ -270,7 +270,9 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;
-      std::size_t expected = 0;  // number of samples before the cut, exactly known only for stored data
+      // number of samples before the place where the file is cut off; exactly known only if the samples are not
+      // compressed
+      std::size_t expected = 0;
       for (const auto& [name, bytes] : pieces) {
         const std::size_t begin = place_of(good, name) + name.size();
         expected += std::min(std::max(size, begin) - begin, bytes.size());
@@ -340,7 +342,8 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // the first piece has 333 samples and one byte, which is lost
+  // the first piece has 333 whole samples and one byte of the next sample, which is lost
+  EXPECT_EQ(count(second - 40), 333u);
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);

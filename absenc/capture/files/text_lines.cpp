@@ -62,7 +62,8 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return decimal;
 }
 
-// Returns the number that `count` digits of `decimal`, from index `first` on, form; missing digits are 0.
+// Returns the whole number formed by `count` digits of `decimal` from index `first` on; digits that it lacks count as
+// 0.
 std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t count) {
   std::int64_t value = 0;
   for (std::int64_t i = first; i < first + count; ++i) {

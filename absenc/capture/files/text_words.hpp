@@ -52,7 +52,7 @@ class TextWords {
 
   static bool is_blank(std::uint8_t c) { return c <= ' ' && (c == ' ' || (c >= '\t' && c <= '\r')); }
 
-  // Returns the index of the first blank from `at` on, or `end_`.
+  // Returns the index of the first blank from index `at` of the buffer on; without a blank, the index of the end.
   [[nodiscard]] std::size_t skip_word(std::size_t at) const {
     constexpr std::uint64_t each = 0x0101010101010101;
     while (std::endian::native == std::endian::little && end_ - at >= 8) {

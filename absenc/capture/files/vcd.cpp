@@ -171,7 +171,8 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Missing upper bits are unknown if the first written bit is unknown, otherwise 0.
+  // Sets the bits of a vector. A vector may be written with fewer bits than it has: the missing upper bits are unknown
+  // if the first written bit is unknown, otherwise 0.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {
@@ -201,9 +202,9 @@ class VcdReader final : public ParsedReader {
   std::string vector_;
   std::uint64_t index_ = 0;
   Tick now_ = 0;
-  bool started_ = false;  // a time or a value change has been read
-  bool valued_ = false;   // a value change has been read
-  bool initial_ = true;   // all values read so far are at the time of the first one, so they are initial levels
+  bool started_ = false;  // true: a time or a value change has been read from the file
+  bool valued_ = false;   // true: a value change has been read from the file
+  bool initial_ = true;   // true: all values read so far have the time of the first one, so they are initial levels
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

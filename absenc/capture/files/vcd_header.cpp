@@ -133,7 +133,7 @@ void VcdHeader::read_variable() {
   if (!has_width || width < 1 || names_.size() + static_cast<std::size_t>(width) > most_channels) {
     fail("declares " + name.substr(0, 80) + " with an impossible width, or more than 65536 channels in all");
   }
-  // A range whose width differs from the variable's is the index of an array element.
+  // If the width of the index range differs from the width of the variable, the range is the index of an array element.
   if (std::abs(left - right) != width - 1) {
     name += ranged ? "[" + std::to_string(left) + "]" : "";
     left = width - 1;

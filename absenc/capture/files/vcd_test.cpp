@@ -39,7 +39,8 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_EQ(reader->layout().channels, (Names{"tx", "rx"}));
   const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(contents.changes[0].before);
-  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // two changes at tick 9 cancel each other, so there is no change
+  // two changes of the same wire at tick 9 cancel each other, so no change is read
+  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));
   EXPECT_FALSE(contents.changes[1].before);
   EXPECT_EQ(contents.changes[1].at, (Ticks{9}));
   EXPECT_EQ(contents.end, 20u);

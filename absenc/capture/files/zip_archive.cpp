@@ -22,7 +22,7 @@ struct Window {
   std::uint64_t buffered_at = 0;
   std::size_t buffered = 0;
   std::array<std::uint8_t, 1 << 16> buffer{};
-  bool mark = false;  // true: the next read of the source is the first one for an entry
+  bool mark = false;  // true: the next read of the source is the first one since an entry was opened
   std::uint64_t entry = 0;
   zip_error_t error{};
 
@@ -96,7 +96,8 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Returns a limit for the compressed size: deflate adds only few bytes to data that cannot be compressed.
+// Returns a limit for the compressed size of `size` bytes: deflate adds only few bytes to data that cannot be
+// compressed.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace

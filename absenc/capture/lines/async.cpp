@@ -79,7 +79,7 @@ std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit
     for (Tick distance; (distance = edges[j] - begin) <= stop; ++j) {
       bit = static_cast<unsigned>(
           static_cast<std::int64_t>(static_cast<double>(static_cast<std::int64_t>(distance)) * per_tick_));
-      bit += middle_[bit] < distance ? 1 : 0;  // index of the first bit whose middle is not before the level change
+      bit += middle_[bit] < distance ? 1 : 0;  // index of the first bit whose middle is at the level change or after it
       levels ^= ~0u << bit;
     }
     const std::size_t next = (levels & 1) != 0 ? i + 2 : j + ((j ^ i) & 1);

@@ -68,7 +68,8 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // Decodes until a character begins at the same time as one of `targets`; returns the index of that target.
+  // Decodes until a character begins at the same time as one of the characters `targets`, which another decoder found;
+  // returns the index of that target.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);
@@ -86,12 +87,12 @@ class AsyncDecoder {
   Start start_;
   bool begun_ = false;
   Tick origin_ = 0;  // first tick of the first part
-  Tick end_ = 0;     // end of the last part, in ticks
+  Tick end_ = 0;     // tick at which the part that was decoded last ends
   // level after all changes given so far; idle is high, also for an inverted line
   bool line_ = true;
   bool level_ = true;           // level before the first change in `edges_`
   std::vector<Tick> edges_;     // level changes from the first incomplete character on, in ticks
-  std::optional<Tick> unsure_;  // time of a level change that may be part of a noise pulse
+  std::optional<Tick> unsure_;  // tick of a level change that is held back, because it may begin a noise pulse
   Statistics statistics_;
 };
 

@@ -13,8 +13,8 @@ constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
 constexpr std::size_t fewest_changes = 4;  // number of changes below which no bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
-constexpr int most_bits = 4;   // each group of pulses is tried as pulses of 1 to 4 bits
-constexpr double worst = 0.5;  // a format with more errors per character than this is refused
+constexpr int most_bits = 4;   // each group of pulses of similar length is tried as pulses of 1 to 4 bits
+constexpr double worst = 0.5;  // a format (bit time and idle level) with more errors per character than this is refused
 // two formats count as equally good if their errors per character differ by less than this
 constexpr double alike = 0.01;
 

@@ -244,7 +244,7 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.characters.size(), 200u);
   EXPECT_EQ(all.characters.front().channel, 1);
   EXPECT_NEAR(all.outcome.formats[0].bit, 10.5, 0.05);
-  // all characters have the same rounding error, so the tolerance is wide
+  // all characters have the same rounding error, so a wide tolerance of the measured baud rate is needed
   EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }

@@ -33,7 +33,7 @@ void LevelReader::expand(Block& block, Levels& levels) const {
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       const auto same = std::find(channels_.begin(), channels_.end(), channels_[i]) - channels_.begin();
       if (static_cast<std::size_t>(same) == i) {
-        // the changes are swapped, so that both vectors keep their storage
+        // the changes are swapped and not copied, so that both vectors keep their storage
         std::swap(levels.changes[i], block.changes[channels_[i]]);
       } else {
         levels.changes[i] = levels.changes[static_cast<std::size_t>(same)];
@@ -43,7 +43,8 @@ void LevelReader::expand(Block& block, Levels& levels) const {
   }
   const std::size_t count = sample_count(block);
   levels.end = block.first + count;
-  // The levels at the borders of blocks are compared by the caller, which joins the parts.
+  // `before` is the level of the block's own first sample; the caller, which joins the parts, compares it with the
+  // level at the end of the previous block.
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     levels.changes[i].before = count > 0 && level_at(block, 0, channels_[i]);
   }

@@ -88,7 +88,8 @@ class BlockRun {
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      const Stop stop{*this};  // its destructor runs before the worker threads are joined, and stops them
+      // the destructor of `stop` makes the worker threads end, and runs before that of `workers` joins them
+      const Stop stop{*this};
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();
       stop.now();
@@ -198,7 +199,7 @@ class BlockRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Job*> free_jobs_;
-  std::deque<Job*> in_order_;  // blocks that were claimed, in the order of the capture
+  std::deque<Job*> in_order_;  // blocks that were claimed and not yet joined, in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

@@ -36,8 +36,8 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // Two lengths of rests are different if they differ by more than a seventh, and by more than the sampling error of
-    // two changes.
+    // Rests of the clock count as rests of two different lengths if their lengths differ by more than a seventh, and by
+    // more than the sampling error of two level changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -79,17 +79,20 @@ bool ClockedDecoder::Wire::before(Tick at) {
 void ClockedDecoder::begin_part(const ClockedPart& part) {
   has_in_ = part.in != nullptr;
   has_out_ = part.out != nullptr;
+  has_direction_ = part.direction != nullptr;
   clock_.begin(part.clock, part.first, begun_);
   in_.begin(part.in, part.first, begun_);
   out_.begin(part.out, part.first, begun_);
   select_.begin(part.select, part.first, begun_);
+  direction_.begin(part.direction, part.first, begun_);
   if (begun_) return;
   begun_ = true;
   last_ = part.first;
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// Begins a burst at the tick `at`. Returns true instead if one of `targets` begins at that tick in the same state.
+// Begins a burst at the tick `at`. If one of `targets`, the bursts that another decoder found, begins at that tick in
+// the same state, returns true instead.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
@@ -126,25 +129,35 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   }
   if (has_in_) put_bit(burst_.in, burst_.bits, in_.before(at));
   if (has_out_) put_bit(burst_.out, burst_.bits, out_.before(at));
+  if (has_direction_) put_bit(burst_.direction, burst_.bits, direction_.before(at));
   ++burst_.bits;
 }
 
-// If the format asks for it, samples the last bit of a word after the last clock change.
-void ClockedDecoder::sample_last_bit() {
-  if (format_.settle == 0 || burst_.has_last || !has_in_) return;
-  burst_.last = in_.before(last_ + format_.settle);
-  burst_.has_last = true;
+// Takes the samples behind the last clock change that are due before `until`, as far as the format asks for them.
+void ClockedDecoder::sample_last_bits(Tick until) {
+  if (format_.settle == 0 || !has_in_) return;
+  if (!burst_.has_last && last_ + format_.settle < until) {
+    burst_.last = in_.before(last_ + format_.settle);
+    burst_.has_last = true;
+  }
+  while (burst_.has_last && burst_.tail_bits < format_.tail) {
+    const Tick at = last_ + (2 * burst_.tail_bits + 3) * format_.settle;
+    if (at >= until) return;
+    burst_.tail = burst_.tail << 1 | (in_.before(at) ? 1u : 0u);
+    ++burst_.tail_bits;
+  }
 }
 
 // A data change at the tick `until` itself counts, because the order of two changes in one sample is unknown.
 void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
-  if (open_) sample_last_bit();
+  if (open_) sample_last_bits(until);
   in_.before(last_ + format_.settle);
   changed_ = changed_ || in_.next() <= until;
 }
 
 bool ClockedDecoder::is_over(Tick rest) const {
+  if (format_.low_goes_on && !clock_.level) return false;
   return rest > format_.pause || (changed_ && rest > format_.change_pause);
 }
 
@@ -154,7 +167,7 @@ bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>
     if (is_over(at - last_)) {
       seen_pause_ = true;
       if (open_) {
-        sample_last_bit();
+        sample_last_bits(at);
         close(last_, false, bursts);
       }
     }
@@ -162,6 +175,7 @@ bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>
   }
   lone_ = open_ && at == burst_.begin;
   burst_.has_last = changed_ = false;
+  burst_.tail = burst_.tail_bits = 0;
   clock_.step();
   last_ = at;
   if (open_ && clock_.level == format_.rising) take(at, bursts);
@@ -185,11 +199,12 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
     if (clock == no_change && select == no_change) break;
     if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
   }
-  if (!format_.has_select && open_ && part.end - last_ > format_.settle) sample_last_bit();
+  if (!format_.has_select && open_) sample_last_bits(part.end);
   detect_data_change(part.end);
   // The next part needs the levels of the data lines after the last clock change of this part.
   in_.before(no_change);
   out_.before(no_change);
+  direction_.before(no_change);
   if (!format_.has_select && open_ && is_over(part.end - last_)) {
     seen_pause_ = true;
     close(last_, false, bursts);

@@ -21,6 +21,10 @@ struct ClockedFormat {
   Tick settle = 0;
   // without chip select: like `pause`, but for rests in which the data line changes; 0: unused
   Tick change_pause = 0;
+  // without chip select: number of samples behind that of the last bit, a clock period apart, for a line with a delay
+  std::uint8_t tail = 0;
+  // without chip select: a rest of the clock at its low level never ends a word
+  bool low_goes_on = false;
 };
 
 /// Lengths of the rests of a clock between words, measured in the first changes of the clock.
@@ -34,12 +38,13 @@ struct ClockRests {
 /// Measures the rests of a clock; returns nothing if the clock has too few changes.
 std::optional<ClockRests> find_rests(const Changes& clock);
 
-/// A part of the capture with the changes of its wires. `in`, `out` and `select` may be null.
+/// A part of the capture with the changes of its wires. All but `clock` may be null.
 struct ClockedPart {
   const Changes* clock;
   const Changes* in = nullptr;
   const Changes* out = nullptr;
   const Changes* select = nullptr;
+  const Changes* direction = nullptr;
   Tick first = 0;
   Tick end = 0;
 };
@@ -62,7 +67,7 @@ class ClockedDecoder {
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
 
  private:
-  // The changes of one wire within a part.
+  // The level changes of one wire in the part of the capture that is decoded.
   struct Wire {
     bool level = false;
     std::span<const Tick> left{};  // changes of the wire that are not handled yet, in ticks
@@ -76,7 +81,7 @@ class ClockedDecoder {
   };
   struct Targets {
     std::span<const Burst> bursts;
-    const Burst* open;  // burst that the other decoder has not completed yet; null: none
+    const Burst* open;  // burst that the decoder of `bursts` has begun and not completed; null: none
     std::size_t next = 0;
     bool met = false;
   };
@@ -90,22 +95,24 @@ class ClockedDecoder {
   void take(Tick at, std::vector<Burst>& bursts);
   void detect_data_change(Tick until);
   [[nodiscard]] bool is_over(Tick rest) const;
-  void sample_last_bit();
+  void sample_last_bits(Tick until);
 
   ClockedFormat format_;
   bool begun_ = false;
   bool has_in_ = false;
   bool has_out_ = false;
+  bool has_direction_ = false;
   Wire clock_;
   Wire in_;
   Wire out_;
   Wire select_;
+  Wire direction_;
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // without chip select: the clock has changed at most once in the present burst
-  bool fell_ = false;     // since the last word the clock has fallen once, and then rested at low level
-  bool changed_ = false;  // the data line has changed during the present rest of the clock
+  bool lone_ = false;     // true, without chip select: the clock has changed at most once in the present burst
+  bool fell_ = false;     // true: since the last word the clock has fallen once, and then rested at low level
+  bool changed_ = false;  // true: the data line has changed during the present rest of the clock
   Burst burst_;
 };
 

@@ -65,7 +65,8 @@ TEST(Clocked, SsiWordsEndAtPauses) {
   EXPECT_EQ(all.outcome.problem, "");
   EXPECT_EQ(all.outcome.pause, 12u);
   ASSERT_EQ(all.bursts.size(), 3u);
-  // The first falling edge samples the idle line, so each burst has one bit more than the word.
+  // At the first falling edge of the clock the decoder samples the idle data line, so each burst has one bit more than
+  // the word.
   EXPECT_EQ(all.bursts[0].bits, 13u);
   EXPECT_EQ(all.bursts[0].in, (std::vector<std::uint8_t>{0x8F, 0x78}));
   EXPECT_EQ(all.bursts[1].in, (std::vector<std::uint8_t>{0xD2, 0xD0}));
@@ -96,7 +97,8 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
     ClockedDrawing drawing;
     drawing.idle(20, idle_clock);
     drawing.spi(0x12, 0xF1);
-    drawing.hold(idle_clock, true, true, false, 60);  // the clock pauses within the exchange, which does not end it
+    // the clock pauses here while chip select is active, which does not end the burst
+    drawing.hold(idle_clock, true, true, false, 60);
     drawing.spi(0x34, 0x0E);
     drawing.idle(10, idle_clock);
     drawing.hold(!idle_clock, true, true, true, 4);  // a clock for another chip, while chip select is inactive

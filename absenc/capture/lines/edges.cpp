@@ -48,8 +48,8 @@ HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T chan
   return bits;
 }
 
-// Writes the positions of the bits set in `toggles`, and up to 7 meaningless values after them. Returns the end of the
-// positions.
+// Writes to `out` the tick of each bit set in `toggles`, and up to 7 meaningless values after them. Returns the end of
+// the meaningful values.
 HWY_INLINE Tick* put(std::uint64_t toggles, Tick base, Tick* out) {
   const auto count = static_cast<std::size_t>(std::popcount(toggles));
   for (std::size_t i = 0; i < count; i += 8) {

@@ -174,7 +174,8 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
       std::vector<std::uint8_t> bytes;
       for (const Character& c : decoded(reader, lines, threads, outcome)) bytes.push_back(c.value);
       RC_ASSERT(outcome.formats[0].idle_high == idle_high);
-      // All characters may have the same rounding error: up to a sample in 8 bits.
+      // The measured bit time may be wrong by a sample in 8 bits, because all characters may have the same rounding
+      // error.
       RC_ASSERT(std::abs(outcome.formats[0].bit - bit) < 0.01 * bit + 1.0 / 8);
       RC_ASSERT(bytes == sent);
       if (first.formats.empty()) first = outcome;

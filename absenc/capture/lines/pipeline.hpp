@@ -60,11 +60,15 @@ struct ClockedLine {
   bool select_high = false;          // true: chip select is active high
   // without chip select: a rest of the clock longer than this, in ticks, ends a word; 0: `choose` decides
   Tick pause = 0;
-  // As in ClockedFormat. If `pause` is 0, `settle` is measured instead.
+  // `settle` and `change_pause` are those of ClockedFormat, but if `pause` is 0, `settle` is measured.
   Tick settle = 0;
   Tick change_pause = 0;
-  /// Returns the index of the pause reading to use if `pause` is 0. Null: the reading whose limit is three clock
-  /// periods is used.
+  std::optional<unsigned> direction{};  // index of the channel that is high while the host drives the data line
+  bool low_goes_on = false;             // as in ClockedFormat
+  // delay of line and transceivers, in ticks: as many more samples are taken behind each word
+  Tick delay = 0;
+  /// Returns, if `pause` is 0, the index of the PauseReading whose limit decides which rests of the clock end a word.
+  /// Null: the limit of three clock periods decides.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 

@@ -12,7 +12,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_changes = 16384;  // number of changes of a line that suffice to detect its settings
-// Limit for the number of changes of one line that are stored while another line has too few.
+// Limit for the number of changes of one line that are stored while another line has too few changes to detect its
+// settings.
 constexpr std::size_t most_changes = 64 * 16384;
 constexpr double fewest_ticks = 2.5;  // shortest bit time, in ticks
 

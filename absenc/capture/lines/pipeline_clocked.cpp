@@ -25,16 +25,18 @@ struct WireIndices {
     in = add(line.in);
     out = add(line.out);
     select = add(line.select);
+    direction = add(line.direction);
   }
   [[nodiscard]] ClockedPart part(const Levels& levels) const {
     const auto at = [&](const std::optional<std::size_t>& index) { return index ? &levels.changes[*index] : nullptr; };
-    return {&levels.changes[0], at(in), at(out), at(select), levels.first, levels.end};
+    return {&levels.changes[0], at(in), at(out), at(select), at(direction), levels.first, levels.end};
   }
 
   std::vector<unsigned> channels;
   std::optional<std::size_t> in;
   std::optional<std::size_t> out;
   std::optional<std::size_t> select;
+  std::optional<std::size_t> direction;
 };
 
 class ClockedDecoding {
@@ -167,6 +169,8 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
            std::to_string(others) + " times, so there is no word: is it the right channel?";
   }
   format.settle = rests->half_period;
+  // A bit is delayed by a clock as soon as the delay is longer than half a period.
+  format.tail = static_cast<std::uint8_t>(std::min<Tick>(32, (line.delay / rests->half_period + 1) / 2));
   format.pause = rests->pauses.front();
   if (!line.choose) return {};
   const Tick last = clock.at[std::min(clock.at.size(), enough_clocks) - 1];
@@ -206,8 +210,9 @@ ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned 
   if (!outcome.problem.empty()) return outcome;
 
   std::vector<Levels> parts;
-  ClockedFormat format{line.rising, line.select.has_value(), line.select_high, line.pause,
-                       line.settle, line.change_pause};
+  ClockedFormat format{
+      line.rising, line.select.has_value(), line.select_high, line.pause, line.settle, line.change_pause,
+      0,           line.low_goes_on};
   if (!line.select && line.pause == 0) {
     outcome.problem = find_pause(reader, wires, line, parts, format);
     if (!outcome.problem.empty()) return outcome;

@@ -88,7 +88,8 @@ inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned 
   return reflected ? reflect(value, width) : value;
 }
 
-/// Returns the covered bits and the checksum of `frame`, changed by `init` and `xorout`, as one polynomial.
+/// Returns the covered bits and the checksum of `frame` as one polynomial, after exclusive OR of the first bits with
+/// `init` and of the checksum with `xorout`.
 inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
                            std::uint32_t init, std::uint32_t xorout) {
   Polynomial word;

@@ -13,7 +13,7 @@ namespace absenc::capture {
 
 namespace {
 
-// log2 of one in a million: a solution with a smaller chance of being accidental is accepted as certain
+// log2 of one in a million: a solution whose chance of being an accident is smaller is accepted as certain
 constexpr double settled_log2 = -20;
 // Highest degree of a common divisor that is factorised; a divisor of higher degree has too many factors.
 constexpr int most_common_degree = 63;
@@ -45,7 +45,8 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  // Possible positions of the first covered byte or bit, for each polynomial and each pair of init and xorout.
+  // Possible positions of the first byte or bit that the checksum covers, for each polynomial and each pair of init and
+  // xorout.
   using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;
 
   void each_order(Shape shape) {
@@ -93,7 +94,8 @@ class CrcSearch {
     plain.trailing = shape.trailing;
     const auto [known, is_new] = known_.try_emplace({plain.trailing, first});
     if (!is_new) return known->second;
-    std::vector<Polynomial> basis;  // independent differences of frames, each with a different degree
+    // linearly independent differences of two frames of equal length, each of a different degree as polynomial
+    std::vector<Polynomial> basis;
     for (const auto& [length, frames] : frames_.lengths) {
       const Polynomial base = content(*frames.front(), plain, first);
       for (const CheckedFrame* frame : frames) {
@@ -255,7 +257,7 @@ class CrcSearch {
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
       const bool is_check = !never_changes(shape);
       for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
-        // Possible positions of the first covered byte, for each constant of the sum.
+        // Possible positions of the first byte that the checksum covers, for each constant of the sum.
         std::map<std::uint8_t, std::vector<std::size_t>> firsts;
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
@@ -302,7 +304,8 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  // stored results of `known_checks`, by `trailing` and the position of the first covered byte or bit
+  // stored results of the function `known_checks`; key: number of bytes or bits behind the checksum, and position of
+  // the first byte or bit that it covers
   std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;

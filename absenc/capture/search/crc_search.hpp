@@ -47,7 +47,7 @@ struct CheckSolution {
 struct CheckSearch {
   // the solutions, sorted: the one that is least likely to be an accident comes first
   std::vector<CheckSolution> solutions;
-  // number of layouts of the checksum for which the frames determine too little to list solutions
+  // number of layouts of the checksum (position and size) for which the frames are too few to list solutions
   std::size_t open = 0;
 };
 

@@ -17,7 +17,7 @@ struct GeneratedCheck {
   CrcParameters parameters{};
   bool low_first = true;
   bool padded = false;
-  std::size_t first = 0;     // number of bytes before the covered part
+  std::size_t first = 0;     // number of bytes in front of the bytes that the checksum covers
   std::size_t covered = 8;   // number of bytes that the checksum covers
   std::size_t trailing = 0;  // number of bytes behind the checksum
 };
@@ -99,7 +99,7 @@ TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
 TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   std::mt19937 random(3);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .first = 1}, 6, random);
-  // with an init of 0, a first byte of zero does not change the CRC
+  // the init of this CRC is 0, so a first byte 00 does not change the CRC, whether the CRC covers it or not
   for (CheckedFrame& frame : frames) frame.bytes.front() = 0;
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());
@@ -239,7 +239,8 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares the list of divisors with the result of trying every polynomial that has the constant term 1.
+// Compares the divisors that `divisors` lists with those found by dividing by every polynomial that has the constant
+// term 1.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;
@@ -255,7 +256,7 @@ RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
 }
 
 TEST(Polynomial, DividesAcrossWords) {
-  Polynomial product;  // the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
+  Polynomial product;  // the dividend is the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
   for (int i = 208; i >= 0; --i)
     product.append(i == 208 || i == 202 || i == 200 || i == 15 || i == 9 || i == 8 || i == 2 || i == 0 || i == 7);
   Polynomial rest = product;

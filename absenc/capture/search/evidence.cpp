@@ -14,7 +14,8 @@ namespace {
 
 // number of random replies that are tried if only one or two frames were captured
 constexpr unsigned many_attempts = 1u << 20;
-// after this number of accepted replies no more are tried: the rate is then known to some percent
+// when this number of random replies was accepted, no more are tried: the share of accepted replies is then known to
+// some percent
 constexpr unsigned enough_accepted = 256;
 
 /// A sink that stores the position that a good reply reports.
@@ -45,7 +46,8 @@ double relative_distance(const Reading& from, const Reading& to) {
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Returns log10 of the chance that random positions move as little as these; nothing if the position never changes.
+// Returns log10 of the chance that random positions would be as near to each other as these; nothing if the position
+// never changes.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
@@ -160,7 +162,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // sum of the terms so far, in multiples of the first term
+  double sum = 0;  // sum of the binomial terms so far, in multiples of the first term
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

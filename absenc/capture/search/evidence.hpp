@@ -31,23 +31,25 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// The evidence for a protocol that captured exchanges give.
+/// How strongly captured exchanges prove that an encoder uses a protocol.
 struct Evidence {
-  std::size_t tried = 0;      // number of exchanges that were examined
+  std::size_t tried = 0;      // number of captured exchanges that were examined
   std::size_t explained = 0;  // number of exchanges with a good reply
-  std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
+  // number of good exchanges that differ from each other, because a repeated one proves no more
+  std::size_t distinct = 0;
   /// log10 of the probability that the unit would accept as many random frames as good.
   double frames = 0;
   /// log10 of the chance that random positions move as little as these; empty: no position changed
   std::optional<double> motion{};
 
-  /// Returns log10 of the chance that all is an accident, by the frames and the motion; the motion counts only if every
-  /// exchange is explained.
+  /// Returns log10 of the chance of an accident: that random frames are accepted as good and, if every exchange is
+  /// explained, that random positions move as little as those read.
   [[nodiscard]] double chance() const;
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
 
-/// Limit of log10 of the chance: at or below it the frames alone, without the motion, are enough evidence for options.
+/// Limit of log10 of the chance of an accident: at or below it the good frames alone, without the motion of the
+/// position, prove the options of an encoder.
 inline constexpr double frames_suffice = -2;
 
 /// Usual limit for the number of random replies tried for a frame.

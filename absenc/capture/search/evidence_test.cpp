@@ -59,7 +59,7 @@ Options with_bits(std::int64_t bits) {
 TEST(Evidence, AcceptanceIsThatOfNoiseBehindRepeatedBytes) {
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), exchange_of(1)), 16.0 / 256, 0.01);
   EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), exchange_of(1)), 1);
-  // A reply without a request has no byte that is fixed by the request.
+  // If the request of a reply was not captured, no byte of the reply is known to repeat a byte of the request.
   const ObservedExchange unsolicited{.reply = {.bytes = {7, 1}}};
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unsolicited), 16.0 / 256, 0.01);
 }

@@ -56,7 +56,8 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis unless it explains nothing or less than others, or decodes the same as one of them.
+  /// Adds a hypothesis unless it explains no exchange, or fewer exchanges than those already found, or decodes the
+  /// exchanges to the same content as one of them.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -142,7 +143,8 @@ class HypothesisSearch {
     return count;
   }
 
-  // Adds the variant of `base` with the fewest bits that explains the most exchanges: frames cannot show more bits.
+  // Adds, of the variants of `base` that explain the most exchanges, the one with the fewest bits, because frames
+  // cannot show whether an encoder has more bits.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;
@@ -185,7 +187,8 @@ class HypothesisSearch {
   const Unit& unit_;
   std::span<const ObservedExchange> exchanges_;
   std::vector<Hypothesis> best_;
-  std::vector<std::uint64_t> meanings_;  // hash of the decoded content for each hypothesis in `best_`
+  // for each hypothesis in `best_`: hash of the content to which it decodes the exchanges
+  std::vector<std::uint64_t> meanings_;
   std::size_t most_ = 0;
   std::size_t tried_ = 0;
 };

@@ -15,25 +15,27 @@ struct Hypothesis {
   Options options{};
   Evidence evidence{};
   std::size_t tried = 1;  // number of hypotheses that were tried, including this one: each may match by chance
-  bool at_least = false;  // true: the encoder may have more bits than `options` state
+  // true: the encoder may have more position or turns bits than `options` state, because frames do not show it
+  bool at_least = false;
 
   /// Returns log10 of the probability that at least one of `tried` hypotheses fits this well by chance.
   [[nodiscard]] double chance() const;
-  /// Returns whether the evidence of the frames alone is enough, without that of the motion.
+  /// Returns whether the good frames alone, without the motion of the position, prove the options of this hypothesis.
   [[nodiscard]] bool is_proven() const;
 };
 
 /// Limit of `Hypothesis::chance`: a hypothesis at or below it counts as found, one above it only as possible.
 inline constexpr double is_found = -3;
 
-/// Returns whether `one` is ranked before `other`: proven hypotheses first, then by chance.
+/// Returns whether `one` is ranked before `other`: proven hypotheses come first, then those with the smaller chance of
+/// being an accident.
 [[nodiscard]] inline bool is_likelier(const Hypothesis& one, const Hypothesis& other) {
   if (one.is_proven() != other.is_proven()) return one.is_proven();
   return one.chance() < other.chance();
 }
 
 /// Returns hypotheses that explain the most exchanges, the likeliest first. The search starts from options with
-/// `settings`, and may change them.
+/// `settings`, and tries other values of these options, too.
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
                                                       std::span<const ObservedExchange> exchanges);
 

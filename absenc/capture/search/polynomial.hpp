@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials over GF(2) that are long enough for a frame.
+// Polynomials over GF(2) whose degree is large enough for all bits of a frame.
 #pragma once
 
 #include <array>

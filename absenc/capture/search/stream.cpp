@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;  // a stream with fewer good frames than this is no evidence
+constexpr std::size_t least_frames = 3;  // a stream with fewer good frames than this is no evidence for a protocol
 
 // Returns the size of the good reply that begins with the first of `bytes`, or 0 if none does.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
@@ -38,7 +38,8 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
-// Returns whether each option in `of_bits` directly states a number of bits of the resolution.
+// Returns whether each option in `of_bits` has as its value the number of single-turn or multi-turn bits of the
+// resolution.
 bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
   return std::all_of(of_bits.begin(), of_bits.end(), [&](std::size_t option) {
@@ -67,7 +68,8 @@ std::vector<Options> stream_options(const Unit& unit) {
   return all;
 }
 
-// Returns a key for sorting, smaller is better: the fewest single-turn bits, then the most multi-turn bits.
+// Returns a key by which hypotheses are sorted in rising order: first those with the fewest single-turn bits, among
+// these first those with the most multi-turn bits.
 std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis) {
   const Resolution resolution = unit.resolution(hypothesis.options);
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
@@ -121,7 +123,8 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
-    // The first frame was searched at every byte of a frame's length, so each of these bytes counts as an attempt.
+    // The begin of the first frame was searched at as many bytes as the longest frame has. Each of these places counts
+    // as a tried hypothesis.
     for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));

@@ -71,7 +71,7 @@ struct PlacedShaft final : Shaft {
   std::int64_t position = 0;
 };
 
-/// Repeated readings, each with the shaft at another position, and their results.
+/// A series of readings over a line with faults, each with the shaft at another position, and the counts of errors.
 template <class Item>
 class Campaign {
  public:
@@ -88,7 +88,7 @@ class Campaign {
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
-  /// Reads `count` times and returns the replies with a position; none on CAN.
+  /// Takes `count` readings and returns the replies that contain a position; returns none on CAN.
   std::vector<GoodReply> good_replies(unsigned count) {
     std::vector<GoodReply> replies;
     if constexpr (!std::is_same_v<Item, CanFrame>) {
@@ -115,7 +115,7 @@ class Campaign {
   // Moves the shaft to a random position of 64 bits, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // older positions are forgotten: no fault delays a reply for so long
+    constexpr Time longest = 30s;  // older shaft positions are forgotten: no fault delays a reply for so long
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
     // Waits until frames with the old position have passed; on SPI, chip select must be released for some time.

@@ -32,7 +32,7 @@ bool has_position(const Unit& unit, const Options& options, const GoodReply& rep
   return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
 }
 
-/// A copy of a good reply in which bits can be flipped.
+/// A copy of a good reply, in which a search flips bits to learn what the decoder detects.
 class CheckCode::AlteredReply {
  public:
   AlteredReply(const Unit& unit, const Options& options, const GoodReply& good)
@@ -76,8 +76,8 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// Searches the check bits from the end of the frame, where most checksums are. Other linearly independent bits would do
-// too.
+// Selects the check bits of the code, beginning at the end of the frame, where most checksums are. Any other linearly
+// independent bits of the frame could serve as check bits.
 bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
@@ -101,8 +101,8 @@ bool CheckCode::find_check(AlteredReply& asked) {
   return true;
 }
 
-// Returns the check bits that must be flipped together with the bit number `bit` to make the reply good again; nothing
-// if there are none.
+// Returns the check bits that must be flipped together with the bit number `bit`, so that the checksum stays right;
+// nothing if no choice of check bits does that.
 std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
@@ -118,7 +118,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
   return {};
 }
 
-// Returns whether the decoder judges 1000 random errors of random replies as the syndromes predict.
+// Returns whether the decoder accepts or rejects 1000 replies with random errors as the syndromes of the code predict.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -129,7 +129,7 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
       asked.flip(bit);
       syndrome ^= syndromes_[bit];
     }
-    // Another check of the decoder may reject the reply before the checksum.
+    // a check of the decoder other than the checksum may reject the reply first
     const Error error = asked.error();
     if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
     for (unsigned one = 0; one < check_.size(); ++one) {
@@ -189,8 +189,8 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// Estimates by importance sampling: draws only errors that the checksum does not detect, because no other can be
-// accepted.
+// Estimates by importance sampling: draws only errors that the checksum does not detect, because the decoder accepts no
+// reply with another error.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

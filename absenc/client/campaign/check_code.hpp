@@ -15,7 +15,7 @@ namespace absenc::client {
 struct GoodReply {
   std::vector<std::uint8_t> request;
   std::vector<std::uint8_t> reply;
-  std::size_t bits = 0;  // number of bits of `reply` on a clocked link; 0: whole bytes
+  std::size_t bits = 0;  // number of bits of `reply` on a clocked link; 0: the reply consists of whole bytes
 
   [[nodiscard]] std::size_t bit_count() const { return bits != 0 ? bits : reply.size() * 8; }
 };
@@ -39,13 +39,15 @@ class CheckCode {
 
   [[nodiscard]] std::size_t bits() const { return syndromes_.size(); }
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
-  /// Returns the number of bits of a reply that are left out of the code.
+  /// Returns the number of bits of a reply that are not part of the code, because the checksum does not cover them or
+  /// because the decoder demands a fixed value.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
-  /// Returns the numbers of code words of each weight from 0 to `most`.
+  /// Returns, for each weight (number of ones) from 0 to `most`, the number of code words of this weight.
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
-  /// Returns the chance that bit errors damage only covered bits, but leave the checksum right.
+  /// Returns the chance that bit errors hit only bits that the checksum covers, and that the checksum does not detect
+  /// them.
   [[nodiscard]] double unseen(double bit_errors) const;
-  /// Estimates the share of all replies that are damaged, yet accepted with another position.
+  /// Estimates the share of all replies that are damaged, yet accepted with a position other than the true one.
   [[nodiscard]] Estimated taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                                 double bit_errors, unsigned samples) const;
 
@@ -59,7 +61,7 @@ class CheckCode {
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;
   [[nodiscard]] std::size_t free_bits() const { return syndromes_.size() - fixed_; }
 
-  // syndrome of each bit of the frame; bit n of a syndrome stands for the check bit `check_[n]`
+  // syndrome of each bit of the frame; bit n of a syndrome stands for the check bit with the index `check_[n]`
   std::vector<std::uint32_t> syndromes_;
   std::vector<bool> is_fixed_;
   std::vector<std::size_t> check_;  // indexes of the check bits in the frame

@@ -46,7 +46,8 @@ class Confirmed : public ::testing::TestWithParam<Encoder> {
     return campaign(GetParam().unit, choices);
   }
 
-  // Allows four standard deviations, and two more positions for very small counts.
+  // Returns by how much the counted number of wrong confirmed positions may exceed the computed number: four standard
+  // deviations, and two more for very small numbers.
   static double chance(const Guarded& guarded) { return 4 * std::sqrt(guarded.let_through) + 2; }
 };
 

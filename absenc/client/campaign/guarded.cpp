@@ -36,11 +36,10 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Returns whether a stored measurement of the shaft, within 2 ms of the reading's latch time, has the reading's
-  /// position.
+  /// Returns whether the shaft had the position of the reading in a stored measurement that is at most 2 ms from the
+  /// reading's latch time.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
-  /// Returns the position that the shaft had when the reading was taken, also if the position of the reading is another
-  /// one.
+  /// Returns the true position of the shaft at the time of the reading, also if the reading has another position.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
@@ -83,10 +82,10 @@ class LetThrough {
       : counts_per_second_(host::counts_per_second(resolution, limit)), bits_(bits) {}
 
   void add_position() { ++positions_; }
-  /// Adds a wrong position, by its distance in counts from the true position.
+  /// Adds a wrong position of a reading, as its distance in counts from the true position.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// Adds a comparison of two consecutive readings: the shaft moved `moved` counts between them, and `before` counts in
-  /// the comparison before.
+  /// Adds a comparison of two consecutive readings. `moved`: counts by which the shaft moved between these two;
+  /// `before`: counts by which it moved between the two readings of the comparison before.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
@@ -182,7 +181,8 @@ class GuardedCampaign {
     return limit;
   }
 
-  // Returns the width of the position with its valid turns, as the host compares it.
+  // Returns the number of bits of the position and, if they are valid, of the turns: the host compares both as one
+  // number.
   static unsigned bits_of(const Reading& reading) {
     return reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
   }

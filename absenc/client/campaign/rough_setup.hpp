@@ -47,7 +47,8 @@ struct Rates {
 
 template <class Item>
 struct RoughBench {
-  /// Connects host and virtual encoder. `what`, `how` and `measured` must outlive the object.
+  /// Connects the host and the virtual encoder of the unit `what` with the options `how`; the encoder measures the
+  /// shaft `measured`. All three must outlive the object.
   RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
       : unit(what),
         options(how),
@@ -75,14 +76,14 @@ struct RoughBench {
     return *one;
   }
 
-  /// Sets the rates of all faults to those of the constructor; with `on` false, to 0.
+  /// With `on`, sets the rates of all faults to those given to the constructor; without it, to 0.
   void set_faults(bool on) {
     line.set_rates(on ? rates.line : sim::RoughRates{});
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Returns the number of requests since the counts `before` were taken; if there were none, the number of unsolicited
-  /// frames, but at least 1.
+  /// Returns the number of requests that were sent after the counts `before` were read; if there were none, the number
+  /// of unsolicited frames since then, but at least 1.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -96,7 +97,7 @@ struct RoughBench {
     }
   }
 
-  // Returns whether a damaged request has changed the encoder, and then replaces the encoder.
+  // Returns whether a damaged request has changed the encoder; if so, puts a new encoder in its place.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;

@@ -69,8 +69,8 @@ void AnnotationRows::fill(const Annotation& annotation, const Options& options, 
                                                 : degrees(reading.singleturn, reading.singleturn_bits);
 }
 
-// Returns the index of the field, or of one with the same name, in the unit's list of fields; the list's length if
-// there is none.
+// Returns the index, in the unit's list of fields, of the given field or of another field with the same name; the
+// length of the list if there is neither.
 std::size_t AnnotationRows::place_of(const FieldInfo& info) const {
   const std::span<const FieldInfo> fields = unit_.fields;
   std::size_t place = 0;
@@ -94,7 +94,7 @@ void AnnotationRows::fill_fields(const capture::Contents& contents, std::vector<
   if (contents.reading != nullptr) fill_alarms(*contents.reading, values);
 }
 
-// Alarms that this reply does not carry come from an earlier reply of the encoder.
+// Alarms that this reply does not report are those of an earlier reply of the same encoder.
 void AnnotationRows::fill_alarms(const Reading& reading, std::vector<Value>& values) const {
   for (const Flags& flags : alarms_of(unit_, reading)) {
     const std::size_t place = place_of(*flags.field);

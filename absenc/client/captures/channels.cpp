@@ -20,11 +20,36 @@ struct WireName {
   std::string_view wire;
   std::string_view name;
 };
-constexpr std::array<WireName, 22> known_names{{
-    {"line", "line"},  {"host", "host"}, {"host", "tx"},    {"device", "device"}, {"device", "rx"}, {"clock", "clock"},
-    {"clock", "clk"},  {"clock", "sck"}, {"clock", "sclk"}, {"clock", "ma"},      {"data", "data"}, {"data", "slo"},
-    {"data", "sdo"},   {"cs", "cs"},     {"cs", "ss"},      {"cs", "ncs"},        {"mosi", "mosi"}, {"miso", "miso"},
-    {"line", "rs485"}, {"bus", "bus"},   {"bus", "can"},    {"bus", "can_rx"},
+constexpr std::array<WireName, 29> known_names{{
+    {"line", "line"},
+    {"host", "host"},
+    {"host", "tx"},
+    {"device", "device"},
+    {"device", "rx"},
+    {"clock", "clock"},
+    {"clock", "clk"},
+    {"clock", "sck"},
+    {"clock", "sclk"},
+    {"clock", "ma"},
+    {"data", "data"},
+    {"data", "slo"},
+    {"data", "sdo"},
+    {"cs", "cs"},
+    {"cs", "ss"},
+    {"cs", "ncs"},
+    {"mosi", "mosi"},
+    {"miso", "miso"},
+    {"line", "rs485"},
+    {"bus", "bus"},
+    {"bus", "can"},
+    {"bus", "can_rx"},
+    {"data", "data_in"},
+    {"data", "rx"},
+    {"data_out", "data_out"},
+    {"data_out", "tx"},
+    {"direction", "direction"},
+    {"direction", "dir"},
+    {"direction", "de"},
 }};
 
 bool same(std::string_view a, std::string_view b) {
@@ -57,7 +82,7 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
 bool is_needed(LinkKind link, std::string_view wire) {
   // A capture of a full-duplex line may contain the host's or the encoder's wire alone.
   if (link == LinkKind::full_duplex) return false;
-  return wire != "cs" && wire != "mosi";
+  return wire != "cs" && wire != "mosi" && wire != "data_out" && wire != "direction";
 }
 
 void assign(WireChannels& found, LinkKind link, std::span<const std::string> channels, std::string_view part) {
@@ -89,6 +114,7 @@ std::span<const std::string_view> wires_of(LinkKind link) {
   static constexpr std::array<std::string_view, 2> full_duplex{"host", "device"};
   static constexpr std::array<std::string_view, 4> spi{"clock", "miso", "mosi", "cs"};
   static constexpr std::array<std::string_view, 2> clocked{"clock", "data"};
+  static constexpr std::array<std::string_view, 4> both_ways{"clock", "data", "data_out", "direction"};
   static constexpr std::array<std::string_view, 1> can{"bus"};
   switch (link) {
     case LinkKind::half_duplex:
@@ -98,8 +124,9 @@ std::span<const std::string_view> wires_of(LinkKind link) {
     case LinkKind::spi:
       return spi;
     case LinkKind::clocked:
-    case LinkKind::clocked_bidirectional:
       return clocked;
+    case LinkKind::clocked_bidirectional:
+      return both_ways;
     case LinkKind::can:
       return can;
   }

@@ -16,7 +16,7 @@ namespace absenc::client {
 /// Returns the names of a link's wires; --channel also accepts other names for them.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
-/// The channel of each wire, in the order of `wires_of`; nothing if the wire has none.
+/// For each wire in the order of `wires_of`, the channel that recorded it; nothing if no channel did.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
   // whether the channels of a full-duplex line were assigned without names of wires, so that host and encoder may be
@@ -24,7 +24,8 @@ struct WireChannels {
   bool assumed = false;
 };
 
-/// Assigns channels to wires by --channel ("D0", "clock=D0"), or without it by names or order. Throws UsageError.
+/// Assigns channels to wires as the option --channel states ("D0", "clock=D0"); without the option, by the names or the
+/// order of the channels. Throws UsageError.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 

@@ -106,8 +106,8 @@ class Comparison {
     return {};
   }
 
-  // The last row has the final value. A value of Role::exchange is different in each exchange of a conversation, so
-  // any row may have it.
+  // The last row of a conversation has the final value of each field. A field with Role::exchange has another value in
+  // each exchange of the conversation, so any row may have the expected value.
   [[nodiscard]] bool agree(std::string_view name, const std::vector<std::string>& of_rows,
                            const std::string& live) const {
     const bool is_of_exchange = std::any_of(unit_.fields.begin(), unit_.fields.end(), [&](const FieldInfo& field) {
@@ -121,14 +121,15 @@ class Comparison {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
   }
 
-  // Compares the live position with the last good row that has one; returns "" if they match.
+  // Compares the position of the live reading with that of the last good row that has a position; returns "" if both
+  // match.
   std::string compare_position(const Said& live) const {
     const Said* row = nullptr;
     for (const Said* one : within_) {
       const bool fits = live.exchanges != 0 || is_of(*one, *live.reading);
       if (one->reading && one->error == Error::none && fits) row = one;
     }
-    // Before the first good frame of a stream, rows may have no position.
+    // Before the first good frame of a stream, rows of the capture may have no position.
     const bool knows_size = std::any_of(
         rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
     if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";

@@ -66,7 +66,7 @@ struct Decoded::Parts {
     } catch (...) {
       const std::exception_ptr failure = std::current_exception();
       try {
-        if (filled > 0) hand_over();  // passes on the rows that were decoded before the failure
+        if (filled > 0) hand_over();  // passes the rows that were decoded before the failure on to the caller
       } catch (const Stopped&) {
       }
       const std::lock_guard lock(mutex);
@@ -123,7 +123,8 @@ struct Decoded::Parts {
   CaptureRun run;
   TickClock clock;
   AnnotationRows rows;
-  std::vector<std::string> notes;  // sentences about the file; complete when decoding has ended
+  // sentences about damage and properties of the capture; complete when decoding has ended
+  std::vector<std::string> notes;
 
   // Members used by the decoding thread only:
   Batch batch;
@@ -135,12 +136,12 @@ struct Decoded::Parts {
   std::mutex mutex;  // the mutex guards the following members except `changed` and `thread`
   std::condition_variable changed;
   std::deque<Batch> ready;
-  std::vector<Batch> used;  // batches that the caller has read, to be filled again
+  std::vector<Batch> used;  // batches of rows that the caller has read, whose memory is used again for new rows
   std::exception_ptr thrown;
   bool ended = false;
   bool stopped = false;
 
-  std::jthread thread;  // last member, because the thread uses all other members
+  std::jthread thread;  // declared last, because the thread uses all other members of this object
 };
 
 Decoded::Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices)

@@ -122,7 +122,8 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
 
 namespace {
 
-// Returns `crc` with another `xorout`, and with the initial value with which it still fits frames of `covered` bits.
+// Returns a CRC like `crc`, but with another `xorout`, and with that initial value with which the result for frames of
+// `covered` bits stays the same.
 CrcParameters with_xorout(CrcParameters crc, std::uint32_t xorout, std::size_t covered) {
   std::uint32_t change = crc.xorout ^ xorout;
   for (std::size_t i = 0; i < covered; ++i) {

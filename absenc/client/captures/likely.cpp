@@ -16,7 +16,7 @@ namespace {
 
 using capture::Tick;
 
-// Counts good frames, unanswered requests and frames with damaged characters.
+// Counts the good frames, the unanswered requests and the frames with damaged characters of a part of a capture.
 struct FrameCounts final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
@@ -36,7 +36,7 @@ bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
 }
 
-/// Collects good replies with their requests, and stops the decoding when it has enough.
+/// Collects good replies with their requests, and stops the decoding when it has collected enough replies.
 struct GoodReplies final : capture::AnnotationSink {
   struct Enough {};
 
@@ -119,7 +119,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     const Options& options;
     std::uint64_t good = 0;
     std::uint64_t bad = 0;
-    bool is_proved = false;  // whether a checksum confirms the frames
+    bool is_proved = false;  // whether at least one good word has a checksum that covers its last bit
 
     Words(const Unit& unit_of, const Options& with) : unit(unit_of), options(with) {}
   };

@@ -117,7 +117,7 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
   return all;
 }
 
-constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a capture is long
+constexpr std::uintmax_t long_file = 300'000;  // a capture file of more bytes than this counts as long
 
 /// The commands of one capture: either all commands that change nothing, except scans, or one command that changes the
 /// encoder.
@@ -148,7 +148,7 @@ class LiveAndCaptured : public ::testing::TestWithParam<const Unit*> {
     try {
       stage.emplace(address);
     } catch (const UsageError&) {
-      return;  // skips options that no virtual encoder has together
+      return;  // skips a combination of option values that no virtual encoder can have
     }
     stage->run(together.commands);
     if (stage->live.empty()) return;
@@ -203,7 +203,7 @@ Said said_with(std::string_view column, std::int64_t value) {
   return said;
 }
 
-// The second request of a conversation has another command code than the first.
+// In the conversation of this test, the second request has another command code than the first.
 TEST(Comparison, TakesExchangeFieldFromAnyRowAndOthersFromLast) {
   std::array<FieldInfo, 2> fields{};
   fields[0].name = "command";

@@ -63,7 +63,7 @@ TEST(PositionTrace, ARampFillsTheDiagonal) {
 TEST(PositionTrace, TurnsGoOn) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 200; ++i) trace.add(i, position(i % 2 * 2048, i / 2, true));
-  trace.add(200, position(4095));  // a position without turns must be left out
+  trace.add(200, position(4095));  // the plot must leave out a position that has no turns
   EXPECT_EQ(trace.count(), 200u);
   EXPECT_NE(line_of(trace.plot(), 0).find("99.50 turns"), std::string::npos) << trace.plot();
 }

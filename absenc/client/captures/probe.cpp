@@ -50,7 +50,8 @@ class Captures {
   std::vector<WireFrame> frames_;
 };
 
-// Returns the values of probed options that later commands need, as settings.
+// Returns, as settings, the values of those probed options that later commands (`decode`, `read`) must be given:
+// options with a single possible value, and open ones whose value is not the default.
 std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
   std::vector<std::string> settings;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

@@ -14,9 +14,12 @@ namespace absenc::client {
 
 struct Probed {
   const Unit* unit = nullptr;
-  bool explained = false;                  // whether at least one set of options explains all frames
-  std::vector<OptionEvidence> evidence{};  // evidence for or against values of the open options
-  std::vector<std::string> settled{};      // options that later commands need, as "name=value"; may be empty
+  // whether all frames are right with at least one combination of option values
+  bool explained = false;
+  // evidence for or against each value of the options that the document leaves open
+  std::vector<OptionEvidence> evidence{};
+  // values that the frames leave for options, which `decode` and `read` need as settings "name=value"; may be empty
+  std::vector<std::string> settled{};
 };
 
 /// Judges captured frames, given in the text form that `absenc decode` reads; "" stands for a missing frame. `requests`

@@ -124,7 +124,8 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Refuses binary formats, because some of them are read from their end, and the end of standard input is not known.
+    // Refuses binary captures on standard input: some binary formats are read from the end of the file, and standard
+    // input has no known end.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
@@ -232,11 +233,17 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   const bool spi = unit_.link == LinkKind::spi;
+  const bool turns = unit_.link == LinkKind::clocked_bidirectional;
   capture::ClockedLine line{.clock = *wires.wires[0],
                             .in = wires.wires[1],
-                            .out = spi ? wires.wires[2] : std::nullopt,
+                            .out = spi || turns ? wires.wires[2] : std::nullopt,
                             .select = spi ? wires.wires[3] : std::nullopt,
-                            .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
+                            // At a falling edge both host and encoder have driven their bit for half a period.
+                            .rising = !turns && (line_.spi_mode == 0 || line_.spi_mode == 3),
+                            .direction = turns ? wires.wires[3] : std::nullopt,
+                            .low_goes_on = turns,
+                            .delay = static_cast<Tick>(static_cast<double>(line_.delay.count()) * 1e-9 *
+                                                       static_cast<double>(ticks_per_second()))};
   CaptureOutcome outcome;
   Guard guard;
   line.choose = [&](std::span<const capture::PauseReading> readings) { return likely_pause(readings, outcome.notes); };
@@ -262,7 +269,8 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // A capture that has only arrival times may begin inside a frame; other captures of bytes hardly do.
+  // A capture with arrival times only may begin inside a frame. Other captures of bytes nearly always begin between two
+  // frames.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;

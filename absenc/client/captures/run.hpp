@@ -35,7 +35,7 @@ struct CaptureOutcome {
   capture::Tick end = 0;             // tick at which the decoded part of the capture ends
   std::vector<double> baud;          // measured baud rate of each asynchronous line; 0: not known
   std::vector<std::string> carries;  // "D0 is the host's", for both channels whose senders were found
-  std::vector<std::string> notes;    // sentences about the capture, such as properties that were detected
+  std::vector<std::string> notes;    // sentences about the capture, for example the baud rate that was detected
   std::vector<capture::Damage> damages;
 };
 
@@ -51,7 +51,8 @@ class CaptureRun {
   [[nodiscard]] const Options& options() const { return options_; }
   /// Returns the number of ticks per second of the capture; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// Returns the options, completed by the capture's frames where possible. Call before `run`.
+  /// Returns the options of the unit. Options that the user left open get the values that the frames of the capture
+  /// show, where they show one. Call before `run`.
   const Options& settle_options();
   /// Decodes the whole capture into `all`. Calls `progress` with the tick that is reached. Throws UsageError, Failure
   /// and the exceptions of `all` and `progress`.
@@ -84,7 +85,7 @@ class CaptureRun {
 
   const Unit& unit_;
   Options options_;
-  LineSettings line_;  // line settings that follow from unit and options
+  LineSettings line_;  // baud rate, parity and other settings of the line that follow from the unit and its options
   CaptureChoices choices_;
   std::unique_ptr<capture::Reader> reader_;
 };

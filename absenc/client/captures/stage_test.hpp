@@ -56,7 +56,7 @@ class HostEnd final : public Port<Item> {
 
   std::uint32_t rate;
   unsigned transfers = 0;
-  bool moved = false;  // whether the host has set another rate, which a capture cannot follow
+  bool moved = false;  // whether the host has changed the rate of the line, which a capture cannot follow
 
  private:
   Port<Item>& port_;
@@ -121,7 +121,8 @@ class Stage {
     }
   }
 
-  // Returns two sets of arguments: with the smallest and with the greatest values, or defaults.
+  // Returns two lists of arguments for the command: the required arguments have their smallest values in the first list
+  // and their greatest ones in the second; the other arguments have their defaults.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {

@@ -31,7 +31,8 @@ inline EncoderAddress polled_address(const std::string& text) {
   return usual;
 }
 
-/// Returns addresses of the unit's virtual encoder, with default options and with other ones.
+/// Returns several addresses of the unit's virtual encoder: one with the default options, and others in which options
+/// have other values.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
   const auto add = [&](const Option& option, std::int64_t value) {
@@ -40,7 +41,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
       EncoderAddress address = parse_address(text);
       const VirtualDevice device(unit, address.options, address.device);
       all.push_back(std::move(address));
-    } catch (const UsageError&) {  // leaves out a value that no virtual encoder has
+    } catch (const UsageError&) {  // leaves out an option value that no virtual encoder can have
     }
   };
   for (const Option& option : unit.options) {

@@ -23,8 +23,9 @@ namespace {
 
 // wait that is longer than an encoder is busy after the write of a byte, including the time of its reply
 constexpr Time settling = std::chrono::milliseconds(50);
-constexpr unsigned tries = 3;        // number of attempts to restore one value
-constexpr std::uint32_t beside = 4;  // number of bytes before the written byte that must stay unchanged
+constexpr unsigned tries = 3;  // number of times that the test tries to restore a changed value of the encoder
+// number of bytes of the memory, directly before the written byte, that must stay unchanged
+constexpr std::uint32_t beside = 4;
 // two positions count as equal if they differ by at most this fraction of a turn, 1/512
 constexpr unsigned position_tolerance = 512;
 
@@ -199,7 +200,8 @@ void ChangeTester::test_offset(const Clause& clause, ClauseResult& result) {
   if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-// The direction cannot be read, so the test looks at the position, unchanged or mirrored.
+// The encoder does not report the direction of counting, so the test compares the position before and after: it is
+// unchanged, or mirrored if the direction has changed.
 void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;

@@ -22,10 +22,12 @@ struct CommandResult {
   Error error = Error::none;
   std::string detail{};
   std::uint64_t requests = 0;  // number of requests that the command sent
-  bool heard = false;          // whether anything but an echo was received after the last request
+  bool heard = false;          // whether anything but an echo was received after the last request of the command
   Answer answer{};
-  std::optional<std::int64_t> value{};  // byte or word of the memory that the reply carries; nothing: none
-  std::vector<std::uint8_t> data{};     // several bytes that the reply carries, low byte of a word first; empty: none
+  // byte or word of the memory in the reply of the command; nothing: the reply has none
+  std::optional<std::int64_t> value{};
+  // several bytes of the memory in the reply of the command, low byte of a word first; empty: the reply has none
+  std::vector<std::uint8_t> data{};
   std::optional<Reading> reading{};
 };
 
@@ -55,7 +57,8 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line. An end of the test throws os::Interrupted only once, so that values can still be restored.
+/// Access to the line for a test that changes the encoder. If the test is interrupted, these functions throw
+/// os::Interrupted only once, so that values can still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request in the form that Unit::encode gives, and returns the exchange

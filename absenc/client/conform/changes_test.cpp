@@ -68,12 +68,12 @@ class Disobedient final : public Machine<Item> {
 
   std::vector<Item> ignored_request{};  // request that the encoder ignores; empty: none
   unsigned obeyed_times = 0;            // number of times that the encoder obeys `ignored_request` before it ignores it
-  // number of the first ignored request, counted from 1; 0 together with `ignored_until` 0: none
+  // number, from 1, of the first request that the encoder ignores; 0 together with `ignored_until` 0: it ignores none
   unsigned ignored_from = 0;
   unsigned ignored_until = 0;  // number of the first request that the encoder does not ignore any more
-  // number of the request whose reply has a wrong bit; 0: none
+  // number of the request whose reply gets a wrong bit; 0: no reply does
   unsigned damaged_at = 0;
-  unsigned change = 0;  // number of the memory change that `spoil` corrupts, from 1; 0: none
+  unsigned change = 0;  // number, from 1, of the memory change that `spoil` corrupts; 0: no change is corrupted
   // corrupts the memory, given its new content and its previous content
   std::function<void(MutableBytes, const ByteList&)> spoil{};
   unsigned requests = 0;
@@ -127,7 +127,8 @@ struct Bench {
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
   /// Returns position and settings as text. The memory is left out, because an encoder may count its writes in it.
   [[nodiscard]] std::string settings() const {
-    // The conformance test may have ended at another rate, or just after a restart of the encoder.
+    // The conformance test may have ended when the encoder had another baud rate, or just after a restart of the
+    // encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {

@@ -68,7 +68,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
-/// Adds mutants that send an earlier reply again, whole or in part; none on CAN.
+/// Adds mutants that replace a reply, or a part of it, by an earlier reply; adds no mutants on CAN.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -136,7 +136,8 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with other conditions, and with a flipped bit in each reply or request.
+/// Returns mutants of two kinds: virtual encoders with another value of a condition, such as the temperature, and
+/// encoders that receive each request, or send each reply, with a flipped bit.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;
@@ -212,7 +213,7 @@ ReplyChanges<Item> special_request_mutants(const Clause& clause) {
         };
       }});
     };
-    // The reply carries the node number of the request.
+    // In both changed replies the low 8 bits of the identifier are those of the request: the node number.
     with_request_id([](Item& reply, std::uint32_t id) { reply.id = (reply.id & ~0xFFU) | (id & 0xFF); });
     with_request_id(
         [](Item& reply, std::uint32_t id) { reply = {.id = 0x100 | (id & 0xFF), .size = 8, .data = {0x11}}; });

@@ -92,7 +92,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
                           << "\", which this encoder keeps\n"
                           << good.report();
     }
-  } catch (const UsageError&) {  // skips options with which no host can read the encoder
+  } catch (const UsageError&) {  // skips option values with which no host can read the encoder
   }
 }
 

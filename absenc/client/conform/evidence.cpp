@@ -43,7 +43,7 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
     arguments.push_back(one.required ? std::max<std::int64_t>(one.minimum, 1) : one.default_value);
   }
   const auto size = unit.encode(options, command, arguments, bytes);
-  // on clocked links a request is spread over several frames
+  // on clocked links a request has no frame of its own: its bits are spread over several frames
   if (!size || *size == 0 || unit.link == LinkKind::clocked) return {};
   const Bytes request = Bytes(bytes).first(*size);
   if (unit.link != LinkKind::can) return {.bytes = {request.begin(), request.end()}};

@@ -19,7 +19,8 @@ namespace absenc::client {
 // greatest number of bytes of a request; on CAN, of characters of its text
 inline constexpr std::size_t longest_request = 64;
 
-/// Returns the request that a clause asks for, as bytes, on CAN as text; empty if there is none.
+/// Returns the request that a test of the clause must send, as bytes, on CAN as text; empty if the clause names no
+/// request.
 [[nodiscard]] std::vector<std::uint8_t> request_of_ask(const Unit& unit, const Options& options, const Ask& ask);
 
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
@@ -30,7 +31,8 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good exchange make the decoder report one of `errors`.
+/// Changes a good exchange in several ways (a flipped bit, another length, another request) and returns for how many of
+/// them the decoder reports one of `errors`.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 

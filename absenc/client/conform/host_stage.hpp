@@ -16,7 +16,8 @@ class HostStage {
  public:
   virtual HostTrial::TrialCounts seen() = 0;
   virtual void set_fault(HostTrial::Fault fault) = 0;  // injects `fault` in place of the previous fault
-  virtual void play(Time until) = 0;                   // serves the host until `until`; throws exceptions of the port
+  // serves the host until the time `until`; throws exceptions of the port
+  virtual void play(Time until) = 0;
 
  protected:
   ~HostStage() = default;

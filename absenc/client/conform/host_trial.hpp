@@ -58,7 +58,7 @@ class HostTrial {
   // number of requests that arrived while the fault `damaged_request` damaged every request
   std::uint64_t refused_ = 0;
   TrialCounts seen_{};
-  // counts of rule checks, without those from times in which a fault affects the host
+  // counts of rule checks; checks during a fault that affects the host are not counted
   std::vector<RuleCount> calm_{};
 };
 
@@ -68,7 +68,7 @@ class HostTrial {
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;
 }
 
-/// Returns the name that the virtual encoder uses for the fault; "" for none.
+/// Returns the name that the virtual encoder uses for this fault; "" if there is no fault.
 [[nodiscard]] constexpr std::string_view name_of(HostTrial::Fault fault) {
   switch (fault) {
     case HostTrial::Fault::silence:

@@ -172,7 +172,7 @@ TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
   const Unit& unit = *GetParam();
   std::size_t tried = 0;
   std::map<std::string_view, unsigned> found;
-  // for each clause: all clauses that the last host to break it has broken
+  // for each clause: all clauses that were broken by the last host that broke this one
   std::map<std::string_view, std::string> with_others;
   const auto left = [&] {
     return std::ranges::any_of(host_clauses_of(unit), [&](const HostClause& one) { return found[one.id] < 2; });
@@ -238,7 +238,8 @@ TEST_P(HostClauses, UnobservedRuleIsUntested) {
   EXPECT_EQ(read.verdict(), Verdict::kept) << read.report();
   for (const ClauseResult& one : read.clauses) {
     const HostClause& clause = *std::ranges::find(host_clauses_of(*GetParam()), one.id, &HostClause::id);
-    // This host only reads positions and memory; its other requests need a script.
+    // The host of this test only reads positions and memory. Clauses about other requests need a host with a script, so
+    // they are left out.
     if (!clause.breaks[0].empty() && clause.options.empty() && one.verdict == Verdict::kept) {
       EXPECT_NE(one.evidence.find("looked at "), std::string::npos) << one.evidence;
       EXPECT_EQ(one.evidence.find("looked at 0"), std::string::npos) << one.evidence;

@@ -50,15 +50,15 @@ class TapPort final : public Port<Item> {
     return event;
   }
 
-  // the first exchange has an empty request; it holds items received before the first request
+  // the first exchange has no request: it holds the bytes or frames that were received before the first request
   std::vector<Exchange> exchanges{1};
 
  private:
   Port<Item>& port_;
 };
 
-/// A device that is no encoder: replies with the items of `next`, and sends them unsolicited if the encoder would do
-/// so.
+/// A device that is no encoder: it replies to each request with the bytes or frames that `next` returns. If the encoder
+/// would send unsolicited frames, it sends them unsolicited.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:
@@ -306,7 +306,7 @@ void check(const Unit& unit) {
       check_strangers<Item>(address, choices);
       check_damaged_line<Item>(address, choices);
     } catch (const UsageError&) {
-      EXPECT_FALSE(usual);  // reading must be possible with the default options; other options may exclude it
+      EXPECT_FALSE(usual);  // only options that are not the defaults may make reading impossible
     }
   }
   std::printf("%s: %zu variations\n", std::string(unit.id).c_str(), variations);

@@ -57,7 +57,7 @@ class Mutant final : public Machine<Item> {
       if (change_reply && mutates()) {
         change_reply(reply_items, step);
         if (reply_items.empty() && driven) continue;
-        // Reports to the device that its reply was sent, although the mutant suppressed it.
+        // Tells the device that its reply was sent, although the mutant has suppressed the reply.
         if (reply_items.empty()) {
           device_.feed({.kind = Kind::sent, .at = now});
           continue;
@@ -72,9 +72,11 @@ class Mutant final : public Machine<Item> {
 
   std::function<void(std::vector<Item>&)> change_request{};
   std::function<void(std::vector<Item>&, Step<Item>&)> change_reply{};
-  // whether the encoder receives `good`, the first request, in place of a damaged special request
+  // whether a special request (`is_special`) that was damaged on the line reaches the encoder as the good request
+  // `good`
   bool on_damage = false;
-  // whether the changed replies are selected by `is_special` instead of by their number, `mutated`
+  // whether the mutant changes the replies to special requests (`is_special`), instead of the reply to the request with
+  // the number `mutated`
   bool changes_special = false;
   bool always = false;  // whether the replies to all requests from number `mutated` on are changed
   // number of the first request, from 1, whose reply is changed
@@ -83,15 +85,17 @@ class Mutant final : public Machine<Item> {
   unsigned requests = 0;
   std::vector<Item> reply_items;
   std::vector<Item> good;  // the first request that was received, which is a good one
-  // index in `specials_` of the only request that counts as special; -1: all of them do
+  // index in `specials_`, the list of requests other than `good`, of the only request that counts as special; -1: each
+  // of them counts
   int special = -1;
-  // further condition for a request to count as special; empty: none
+  // further condition that a request must meet to count as special; empty: there is none
   std::function<bool(const std::vector<Item>&)> is_meant{};
-  // whether the last request is special: different from `good`, and selected by `special` and `is_meant`
+  // whether the last request is a special one, whose reply may be changed: it differs from `good`, and `special` and
+  // `is_meant` select it
   bool is_special = false;
 
  private:
-  // Decides whether the request is special. A damaged request is given as one without items.
+  // Sets whether the request is special. For a request that the line has damaged, `request` is empty.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;

@@ -22,7 +22,7 @@ struct Readings {
   std::vector<Attempted> all{};
   std::uint64_t requests = 0;   // number of requests, pulses and transfers that were sent
   std::uint64_t answered = 0;   // number of requests that got a reply
-  std::uint64_t good = 0;       // number of requests whose readings were good, or of good unsolicited frames
+  std::uint64_t good = 0;       // number of requests whose readings were good, or number of good unsolicited frames
   std::uint64_t discarded = 0;  // number of damaged frames in a stream
 
   /// Returns the first good reading that is no clocked word of equal bits; null if there is none.

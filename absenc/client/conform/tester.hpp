@@ -95,10 +95,10 @@ class Tester {
   // second reply.
   struct NextRequest {};
 
-  // The time of listening for a reply is 20 ms and the duration of 16 characters.
+  // The test listens for a reply for 20 ms plus the duration of 16 characters.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
-  static constexpr unsigned times = 3;  // number of times that a test sends its command or request
+  static constexpr unsigned times = 3;  // number of times that each test sends its command or request to the encoder
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
   // ---- Access to the line
@@ -229,7 +229,8 @@ class Tester {
       return request;
     }
   }
-  /// Counts, for `time`, CAN frames that are like the replies to the readings; returns 0 on other links than CAN.
+  /// Listens for `time` and counts the good CAN frames that have the identifier of a reply to a reading; returns 0 if
+  /// the link is not CAN.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
@@ -279,7 +280,8 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // Tries several other addresses, because at a single one a neighbour on the line may reply.
+  // Sends requests to several addresses other than the encoder's: at a single address another device on the line may
+  // reply.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),

@@ -35,10 +35,11 @@ struct Flaws {
   unsigned stops_at_damage = 0;
   // number of damaged requests after which the host stops at the latest; 0: it never stops
   unsigned stops_at_refusal = 0;
-  Time skipped_wait{};  // longest wait that the host leaves out when it reads the memory; 0: it leaves none out
+  // while the host reads the memory: longest prescribed wait that it leaves out; 0: it leaves none out
+  Time skipped_wait{};
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:
-  Time too_early_by{};     // time by which each transfer begins too early
+  Time too_early_by{};     // time by which a transfer begins before the time that the protocol demands
   std::uint32_t rate = 0;  // clock rate in Hz; 0: the rate that the host requests
   int bytes = 0;           // number of bytes added to each transfer, negative: removed; at least one byte remains
   bool other_mode = false;

@@ -48,7 +48,7 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
   const Bytes raw = attempt.raw;
-  if (is_frame(raw)) return false;  // a reply that is a single frame has no other bytes
+  if (is_frame(raw)) return false;  // the received bytes are exactly one good frame, so there are no further bytes
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
       is_frame(raw.subspan(sent.size()))) {

@@ -103,7 +103,7 @@ std::vector<Fault> port_faults() {
   return faults;
 }
 
-/// Examines a line on which an encoder replies at one rate and is silent at all others.
+/// Examines a line on which an encoder replies at one baud rate and is silent at all others.
 Examination examine_rate(std::string_view text, std::uint32_t rate) {
   return examine_with(text, [rate](const EncoderAddress& address) {
     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();

@@ -23,7 +23,7 @@ TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   const Examination uneven = examine_contact(
       6s, [](Time at) { return (at > 1s && at < 1100ms) || (at > 1900ms && at < 2s) || (at > 5s && at < 5100ms); });
   EXPECT_THAT(uneven.findings.at(0).evidence, AllOf(HasSubstr("in 3 bursts"), HasSubstr("at uneven distances")));
-  // Failures that occur independently are no bursts.
+  // Failed readings that are independent of each other form no bursts.
   std::mt19937 random(5);
   const Examination any = examine_contact(5s, [&](Time) { return random() % 10 == 0; });
   EXPECT_THAT(ids(any), Contains("sometimes_silent"));
@@ -51,7 +51,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.computer_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
-  // A single late reply may be due to this computer.
+  // A single late reply may come from a delay of this computer, not of the encoder.
   seen.readings.resize(9);
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
   seen.late = 1;
@@ -159,7 +159,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   EXPECT_THAT(ids(judged(seen)), Not(IsEmpty()));
 }
 
-/// Frames that waited in this computer are read at once, so the speed between them is unknown.
+/// Frames that waited in this computer are read all at once, so the speed of the shaft between them is unknown.
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
   for (std::size_t i = 100; i < 150; ++i)

@@ -23,18 +23,20 @@ namespace absenc::client {
 
 namespace {
 
-// number of readings with another setting before it is compared with the user's; a setting without any good reply
-// is dropped
+// Number of readings with a tried setting, such as another baud rate, before it is compared with the user's setting. A
+// tried setting without any good reply is dropped.
 constexpr std::size_t first_readings = 2;
-constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
+// number of readings with each of the two compared settings, in one turn of the comparison
+constexpr std::size_t trial_readings = 5;
 constexpr unsigned trial_turns = 2;
-// Time limit for the readings with each setting in one turn of the comparison: this time, and the duration of 200
-// characters.
+// Time limit for the readings with one setting in one turn of the comparison, to which the duration of 200 characters
+// is added.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
-// An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
+// An encoder that was powered on just before the first request is assumed to reply at most this time later. tformat
+// needs 1.5 s.
 constexpr Time longest_start = std::chrono::seconds(2);
-// time limit of the first readings that are tried with other models and options
+// time limit of the readings with which other models and options are tried
 constexpr Time models_limit = std::chrono::seconds(3);
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(16);
@@ -125,7 +127,8 @@ class Doctor {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
     seen_.facts.kernel_direction = now.kernel_direction;
-    seen_.facts.latency_timer = now.latency_timer;  // opening the port may have shortened the latency timer
+    // absenc may have shortened the driver's latency timer when it opened the port
+    seen_.facts.latency_timer = now.latency_timer;
   }
 
   template <class Item>
@@ -209,8 +212,9 @@ class Doctor {
     try_each<Item>(other_addresses(address_), addresses_limit);
   }
 
-  // Tries settings until one is far better than the user's, or until the user's settings give mostly good readings
-  // again. Returns true then, so that the search ends; false if neither happens within `limit`.
+  // Reads with each of these settings in turn. Returns true as soon as one of them is far better than the user's, or
+  // the user's settings give mostly good readings again, which ends the search; returns false after the last setting or
+  // the time `limit`.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -249,8 +253,8 @@ class Doctor {
     return true;
   }
 
-  // Reads twice more with the user's settings, and takes the readings again if both are good: the encoder may have been
-  // powered on meanwhile.
+  // Reads twice more with the user's settings. If both readings are good, takes the whole series of readings again,
+  // because the encoder may have been powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
     const Time first = seen_.readings.empty() ? Time::min() : seen_.readings.front().began + longest_start;
@@ -314,8 +318,8 @@ class Doctor {
       const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character();
       examiner.read(*read, count, limit, attempts);
       return examiner.now() - begin;
-    } catch (const os::Failure&) {  // the port does not support this setting, or failed
-    } catch (const UsageError&) {   // the options need a wire that is not connected
+    } catch (const os::Failure&) {  // the port does not support the tried setting, or the port was lost
+    } catch (const UsageError&) {   // the tried options need a wire that is not connected
     }
     return {};
   }

@@ -59,8 +59,8 @@ class Examiner {
     if (at > now()) runner_.listen(at - now());
   }
 
-  /// Takes up to `count` readings, begins none after `limit`, and adds them to `into`. Ends early if the first ones
-  /// bring no good reply. Throws the exceptions of the port.
+  /// Takes up to `count` readings and adds them to `into`; begins no reading after the time `limit`. Ends early if the
+  /// first readings bring no good reply. Throws the exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     runner_.repeat(
         series(count, limit), [&] { return attempt_reading(command); }, into);

@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr unsigned examinations = 200;  // number of examinations of each mode
+constexpr unsigned examinations = 200;  // number of examinations with the encoder in each mode
 constexpr std::size_t readings = 40;
 
 class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};
@@ -63,7 +63,7 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     try {
       usual = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
       if (examined(*usual, 1).good == 0) continue;  // skips options with which the virtual encoder cannot be read
-    } catch (const std::exception&) {               // skips options that exclude each other
+    } catch (const std::exception&) {               // skips option values that exclude each other
       continue;
     }
     ++modes;

@@ -324,7 +324,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
-  // A fault of the port or of the line already explains bad frames.
+  // Frames are judged only without a fault of the port or of the line, because such a fault already explains bad
+  // frames.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });

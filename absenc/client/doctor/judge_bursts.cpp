@@ -25,7 +25,8 @@ struct Burst {
 
 // Returns the series of consecutive failures that are too long to be a coincidence of independent failures.
 std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t failed) {
-  // greatest probability that independent failures form such a series among all these readings
+  // a series of failures is a burst if independent failures would form one among all readings with at most this
+  // probability
   constexpr double chance = 1e-3;
   const auto all = static_cast<double>(readings.size());
   const double longest = std::log(chance / all) / std::log(static_cast<double>(failed) / all);

@@ -80,7 +80,7 @@ class Mender {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // Inserts first as many bytes as the frame lacks according to its beginning.
+    // If the beginning of the reply states the length of the frame, tries first to insert as many bytes as are missing.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
     for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
@@ -156,7 +156,7 @@ struct Suspicion {
   FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
   bool (*undo)(const Mender& mender, std::size_t& count);
-  std::size_t most_tried;      // greatest number of replies for which undoing the change is tried
+  std::size_t most_tried;      // greatest number of replies that are decoded again with the change undone
   bool of_each_reply = false;  // whether the change affects each reply, independent of its bytes
 };
 
@@ -198,7 +198,7 @@ bool undo_newline(const Mender& mender, std::size_t& count) {
   return mender.without(places);
 }
 
-// Returns the indexes of the second FF of each pair FF FF.
+// Returns the indexes at which the second byte of a pair FF FF stands.
 std::vector<std::size_t> doubled(const ByteList& raw) {
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i + 1 < raw.size(); ++i) {
@@ -232,8 +232,9 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
-constexpr std::size_t cheap = 24;  // greatest number of replies for which undoing a change is tried
-constexpr std::size_t dear = 10;   // greatest number of replies if undoing a change decodes each thousands of times
+constexpr std::size_t cheap = 24;  // greatest number of replies that are decoded again with a change undone
+// greatest number of replies that are decoded again, if undoing the change takes thousands of decodings for each reply
+constexpr std::size_t dear = 10;
 
 // The first change that explains the replies is reported, so changes whose search takes long come last.
 constexpr auto suspicions = std::to_array<Suspicion>({
@@ -267,7 +268,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
   if (suspicion.of_each_reply && !of_nearly_all) return {};
-  // A long reply is hardly ever good without its 8th bits.
+  // A long reply that stays good without the 8th bits of its bytes is very rare.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
   if (suspicion.finding_kind == FindingKind::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long))
     return {};

@@ -44,7 +44,7 @@ Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
 
-// Returns whether `is` returns true for at least 8 of 10 attempts; the remaining attempts may be noise.
+// Returns whether `is` returns true for at least 8 of 10 readings; the remaining readings may be disturbed.
 template <class Is>
 bool most(const All& all, const Is& is) {
   const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
@@ -96,7 +96,7 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(FindingKind::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
-// Reports that two encoders reply at the same address, if a scan found that.
+// Reports that two encoders reply at the same address, if a scan of the bus has found such an address.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(FindingKind::same_address, {one.seen.clash});
@@ -133,7 +133,8 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// At least one attempt of `all` must be a contradiction.
+// Makes the finding `contradictory`. At least one reading of `all` must have a reply that contradicts its request, an
+// earlier reply or itself.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -191,7 +192,7 @@ std::optional<Finding> stretched(const Case& one, const All& all) {
 
 // The bytes and bits in which a damaged reply differs from the usual reply of a shaft at rest.
 struct Damage {
-  std::size_t first = 0;  // indexes of the first and the last damaged byte
+  std::size_t first = 0;  // indexes in the reply of the first and the last byte that differ from the usual reply
   std::size_t last = 0;
   std::size_t flips = 0;
 };
@@ -357,7 +358,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     return;
   }
   if (most(all, [](const Attempted& attempt) { return attempt.error == Error::out_of_range; })) {
-    // The checksums are right, so with another format all replies may be good, including those that are good now.
+    // The checksums are right, but values are out of range. With another format all replies may be good, including
+    // those that are good now.
     if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
       findings.push_back(std::move(*other));
       return;
@@ -386,7 +388,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // A contradiction is reported only if there is no other damage, because it may be damage that the checksum missed.
+  // A reply that contradicts its request, an earlier reply or itself is reported only if no reply has other damage: the
+  // contradiction may come from damage that the checksum missed.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();
@@ -415,7 +418,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     if (!are_cut || !may_be_the_computer(one.seen, both.size())) findings.push_back(some_damage(one, both));
   }
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
-  // A late reply may make the next reading fail as well.
+  // A late reply may collide with the next request, so that the next reading fails as well.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));
   }

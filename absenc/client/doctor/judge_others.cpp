@@ -62,7 +62,7 @@ std::string quoted(Bytes bytes, std::size_t at) {
   return text + "\"";
 }
 
-// Returns the checksums that explain these frames; none if `find_crc` refuses the frames.
+// Returns the checksums that would explain the received frames; returns none if `find_crc` refuses the frames.
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);
@@ -132,10 +132,11 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   return finding(FindingKind::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
-// Searches options that explain the replies, as `identify` does, but only those of this unit with the encoder's
-// address.
+// Searches, as `identify` does, for options that explain the replies, but only options of this unit, and with the
+// encoder's address unchanged.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // least number of replies; fewer are too weak evidence
+  // least number of replies from which other options are concluded; fewer replies are too weak evidence
+  constexpr std::size_t enough = 4;
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);

@@ -27,10 +27,11 @@ struct Walk {
   std::vector<std::uint64_t> places{};
   std::vector<std::int64_t> steps{};
   std::vector<Time> pauses{};
-  std::int64_t lowest = 0;  // lowest position relative to the first, in counts, continued past the end of the counter
+  // lowest position minus the first position, in counts; the positions are continued past the end of the counter
+  std::int64_t lowest = 0;
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // the numbers of turns that readings report as valid
+  std::set<std::int64_t> turns{};  // all numbers of turns that occurred in readings with valid turns
   std::size_t zero_crossings = 0;
   Time time{};  // time from the first to the last reading with a valid position
 
@@ -81,7 +82,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A wide movement is no noise; neither is a slow swing, which seldom changes direction.
+  // A movement over many counts is no noise; neither is a slow swing, which seldom changes direction.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0

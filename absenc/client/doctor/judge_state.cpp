@@ -26,7 +26,8 @@ struct RaisedFlag {
   std::set<std::string_view> channels{};  // names of the fields, one for each channel, that report the flag
   const Reading* last = nullptr;          // the last of the readings that report the flag as raised
   std::size_t readings = 0;
-  // number of the readings with this flag raised whose position or turns are invalid; 0 if that may be damage
+  // number of readings with this flag raised and with an invalid position or invalid turns; 0 if these readings may be
+  // damaged replies
   std::size_t invalid = 0;
 };
 

@@ -202,7 +202,7 @@ std::vector<std::string> readable_modes(const Unit& unit) {
       const EncoderAddress address = address_of(unit, mode, "");
       const Read one = reading_of(address);
       if (one.error == Error::none && known.insert(one.wire).second) modes.push_back(mode);
-    } catch (const std::exception&) {  // skips options that exclude each other
+    } catch (const std::exception&) {  // skips option values that exclude each other
     }
   }
   return modes;
@@ -248,7 +248,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
       try {
         address = address_of(unit(), mode, state);
         static_cast<void>(device_of(*address));
-      } catch (const std::exception&) {  // with these options the encoder cannot have this state
+      } catch (const std::exception&) {  // skips a state that the encoder cannot have with the options of this mode
         continue;
       }
       const auto [error, reading, wire] = reading_of(*address);
@@ -344,7 +344,7 @@ std::string state_table() {
       std::optional<Examination> examination;
       try {
         examination = examined(address_of(*unit, "", state)).examination;
-      } catch (const std::exception&) {  // with these options the encoder cannot have this state
+      } catch (const std::exception&) {  // skips a state that the encoder cannot have with its default options
         continue;
       }
       const Finding* first = examination->first();

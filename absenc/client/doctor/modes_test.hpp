@@ -17,7 +17,7 @@ namespace absenc::client {
   std::vector<std::string> modes{""};
   for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
   for (const Option& option : unit.options) {
-    // the rate is no mode here, because simulated hosts and encoders always have the same rate
+    // a baud rate is no mode here, because simulated hosts and encoders always have the same rate
     if (option.role == Role::rate) continue;
     for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
   }

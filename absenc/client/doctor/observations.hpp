@@ -20,7 +20,7 @@ namespace absenc::client {
 
 /// A setting that was tried instead of the user's.
 struct Trial {
-  FindingKind finding_kind{};  // kind of the finding that is reported if the other setting helps
+  FindingKind finding_kind{};  // kind of the finding that is reported if readings succeed with `setting`
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
@@ -51,45 +51,48 @@ struct Observations {
   PortKind place = PortKind::serial;
   std::string port{};  // path of the serial port; "": the port is of another kind
   os::PortFacts facts{};
-  // errors that the UART counted during the examination; nothing: not known
+  // errors of characters that the UART counted during the examination; nothing: not known
   std::optional<os::LineCounts> damage{};
   std::optional<Refusal> refusal{};
-  std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request, about the first 4096
+  // bytes that were received before the first request; only about the first 4096 are stored
+  std::vector<std::uint8_t> unsolicited{};
   Time listened{};
   // whether bytes were received in at least 4 of the 5 periods of listening before the first request
   bool never_silent = false;
   std::vector<Attempted> readings{};
-  // Failed requests that the host repeated within a reading.
+  // failed requests that the host repeated within a reading, so that the reading itself may be good
   std::vector<Attempted> repeated{};
-  std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
-  std::size_t doubled = 0;                  // number of frames of a stream that arrived twice; 0 also if these are few
+  std::vector<Attempted> damaged_frames{};  // damaged frames of a stream; the stream is cut into frames at its pauses
+  std::size_t doubled = 0;                  // number of frames of a stream that arrived twice; 0 if only a few did
   bool is_stream = false;                   // whether the encoder sends frames without requests
   std::vector<Attempted> turned{};          // readings during which the user was to turn the shaft by hand
-  std::uint64_t line_errors = 0;            // number of line errors that the port reported; on CAN, of error frames
-  std::uint64_t late = 0;      // number of replies that began after their timeout or answered an older request
-  Time lateness{};             // greatest time from a request to its late reply; 0: no reply was late
-  std::uint64_t overfull = 0;  // number of good replies with further bytes after them that no request explains
+  // number of line errors that the port reported; on CAN, the number of error frames
+  std::uint64_t line_errors = 0;
+  std::uint64_t late = 0;  // number of replies that began after their timeout or answered an older request
+  // longest time between a request and its reply among the late replies; 0: no reply was late
+  Time lateness{};
+  std::uint64_t overfull = 0;  // number of good replies after which further bytes arrived that no request explains
   std::vector<std::uint8_t> overfull_example{};
-  std::size_t most_behind = 0;  // greatest number of further bytes after a good reply
+  std::size_t most_behind = 0;  // greatest number of further bytes that followed a good reply
   std::vector<Trial> trials{};
   std::vector<ClockTrial> clocks{};   // readings with other clock rates, the slowest first; empty: none were tried
   std::optional<bool> data_driven{};  // whether something drives the data pin of the port; nothing: not known
-  host::EchoMode echo_said{};         // echo mode that the user set
-  host::EchoMode echo{};              // echo mode at the end: that of the user, or detected
-  std::optional<Time> latency{};      // latency that the user set
-  Time computer_late{};               // greatest delay of this computer during the readings (os::DelayWatch)
-  host::SpeedLimit limit{};           // speed limit of the encoder's shaft
-  std::string clash{};                // address at which two encoders seem to reply, "address 3"; "": none
+  host::EchoMode echo_said{};         // whether the adapter echoes requests, as the user has set it
+  host::EchoMode echo{};          // whether the adapter echoes requests, as the user has set it or as it was detected
+  std::optional<Time> latency{};  // latency of the connection, as the user has set it
+  Time computer_late{};           // greatest delay of this computer during the readings (os::DelayWatch)
+  host::SpeedLimit limit{};       // highest speed that is assumed for the encoder's shaft
+  std::string clash{};            // address at which two encoders seem to reply, "address 3"; "": none
   bool complete = true;
 };
 
-/// Returns the number of good attempts.
+/// Returns how many of the given readings are good.
 [[nodiscard]] inline std::size_t count_good(const std::vector<Attempted>& attempts) {
   return static_cast<std::size_t>(
       std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
 }
 
-/// Returns whether at most one in 20 attempts is good; so few good replies may be due to chance.
+/// Returns whether at most one in 20 readings is good; so few good readings may be due to chance.
 [[nodiscard]] inline bool hardly_any_good(const std::vector<Attempted>& attempts) {
   return count_good(attempts) * 20 < attempts.size() + 1;
 }

@@ -61,7 +61,8 @@ inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t
   return seen;
 }
 
-constexpr std::uint64_t hand_counts = 1201;  // counts per millisecond of a shaft at 550 rpm (17 bits)
+// speed of a shaft at 550 rpm, in counts per millisecond of an encoder with 17 bits
+constexpr std::uint64_t hand_counts = 1201;
 
 /// Examines a line on which an encoder replies to no request while `dead(now)` is true.
 inline Examination examine_contact(Time time, const std::function<bool(Time)>& dead) {

@@ -17,7 +17,7 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
     return text;
   }
 
-  /// Checks the first finding of each of these faults at each rate of the unit.
+  /// Checks, at each baud rate of the unit, that doctor's first finding about each of these faults is an expected one.
   void examine_each(const std::vector<PathFault>& faults) const {
     const Unit& unit = *GetParam();
     const std::string mode = asked_mode(unit);
@@ -91,7 +91,8 @@ TEST(Doctor, SlowLineHasTimeForEachReadingOfComparison) {
       << seen.examination.first()->evidence;
 }
 
-// The first 32 of 200 positions of a slowly turning shaft need 13 of their 16 bits.
+// The shaft turns slowly: the first 32 of 200 positions are small enough for a resolution of 13 bits, although the
+// encoder has 16 bits.
 TEST(Doctor, OtherSettingsFitTheLastFramesToo) {
   Pair pair = pair_of(*find_unit("raa38-modbus"), "", "baud=19200", {"bits=16", "singleturn=1100", "motion=rpm=14"});
   pair.far.goes_on = true;

@@ -103,16 +103,17 @@ class Talker final : public Machine<std::uint8_t> {
 struct Far {
   EncoderAddress encoder;  // address of the virtual encoder, "sim:tformat?model=23-bit"
   std::uint32_t rate = 0;  // rate of the encoder's line in bits per second; 0: the rate of the user's address
-  Change change{};         // change of reply bytes by the adapter; empty: none
+  Change change{};         // change that the adapter makes to the bytes of a reply; empty: the adapter changes nothing
   std::optional<EncoderAddress> second{};  // second encoder on the same line; nothing: there is none
   std::function<bool(Time now)> is_cut{};  // returns true while a contact of the line is open; empty: never
-  Time delay{};                            // time by which the encoder's replies begin later
+  Time delay{};                            // time by which the line delays the encoder's replies
   bool goes_on = false;                    // whether the time of the encoder continues when the port is opened again
   // makes another device instead of the encoder; empty: the encoder is connected
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes; with `goes_on`, always to the same ones.
+/// Opens links to the devices that `Far` describes: each time to new devices, or with `goes_on` always to the same
+/// ones.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -237,7 +238,8 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// Returns a setting with which the unit sends no stream; "": none is needed, or none was found.
+/// Returns a setting with which the encoder sends no unsolicited frames; "" if it sends none anyway, or if there is no
+/// such setting.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
@@ -281,7 +283,7 @@ inline std::string of_encoder(const Unit& unit, const std::string& setting) {
 }
 
 struct Pair {
-  std::string asked;  // address of the encoder as the user writes it
+  std::string asked;  // the address under which the user expects the encoder, which may be wrong
   Far far;
 };
 

@@ -15,7 +15,7 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-// least number of pieces, distances or doubled frames of a stream from which conclusions are drawn
+// least number of stream pieces, of distances between frames, or of doubled frames from which a conclusion is drawn
 constexpr std::size_t enough = 8;
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.

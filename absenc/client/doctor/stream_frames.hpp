@@ -25,17 +25,17 @@ struct StreamBytes {
   void append(const LineExchange<std::uint8_t>& line);
 };
 
-/// Returns the pieces of the stream between its pauses, each as a reading.
+/// Divides the stream at its pauses and returns each piece as a reading.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 
 /// Inserts a failed reading for each frame that seems to be missing between the readings of a stream.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
-/// Counts good frames that arrived twice in a row; 0 unless there are many and the frames change.
+/// Returns the number of good frames that arrived twice in a row; 0 if only a few did, or if the frames hardly change.
 [[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
-/// Adds evidence of the stream to `seen`; may replace `seen.readings`.
+/// Adds to `seen` the damaged, missing and doubled frames of the stream; may replace `seen.readings`.
 void conclude_stream(const Unit& unit, const Options& options, const StreamBytes& stream, Observations& seen);
 
 }  // namespace absenc::client

@@ -118,7 +118,8 @@ std::vector<Time> regular_arrivals(std::size_t count) {
 TEST(StreamFrames, FramesThatDidNotComeAreFailedReadingsAtTheirTime) {
   std::vector<Attempted> readings = good_readings(30);
   std::vector<Time> arrivals = regular_arrivals(30);
-  for (std::size_t i = 10; i < 30; ++i) arrivals[i] += 30ms;  // three frames are missing before reading 10
+  // moves the arrivals from frame 10 on by three periods, as if three frames before it were missing
+  for (std::size_t i = 10; i < 30; ++i) arrivals[i] += 30ms;
   insert_missing_frames(readings, arrivals);
   ASSERT_EQ(readings.size(), 33u);
   for (std::size_t i = 10; i < 13; ++i) {
@@ -130,7 +131,8 @@ TEST(StreamFrames, FramesThatDidNotComeAreFailedReadingsAtTheirTime) {
 
 TEST(StreamFrames, LateFramesAreNotMissing) {
   std::vector<Time> arrivals = regular_arrivals(30);
-  arrivals[10] = arrivals[11] = arrivals[12] = arrivals[13];  // three frames arrive late, together with the fourth
+  // frames 10, 11 and 12 arrive late, together with frame 13
+  arrivals[10] = arrivals[11] = arrivals[12] = arrivals[13];
   EXPECT_EQ(missing_of(good_readings(30), arrivals), 0u);
 }
 

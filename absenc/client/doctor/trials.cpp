@@ -50,7 +50,7 @@ std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint
   return other;
 }
 
-// Returns the rates to try: first those of the protocol and its models, then common ones.
+// Returns the baud rates to try: first those of the protocol and its models, then other common rates.
 std::vector<std::uint32_t> rates_of(const Unit& unit) {
   std::vector<std::uint32_t> rates;
   const auto add = [&](std::uint32_t rate) {
@@ -252,7 +252,8 @@ bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said
            std::lgamma(static_cast<double>(all - some + 1));
   };
   const std::size_t all_good = good + good_as_said;
-  double sum = 0;  // probability that chance gives as many or more good readings to this setting
+  // probability that by chance at least as many of all good readings would be among those with the tried setting
+  double sum = 0;
   for (std::size_t more = good; more <= std::min(tried, all_good); ++more) {
     if (all_good - more > tried_as_said) continue;
     sum += std::exp(log_choose(tried, more) + log_choose(tried_as_said, all_good - more) -

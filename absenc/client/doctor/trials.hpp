@@ -15,7 +15,7 @@ namespace absenc::client {
 
 /// A setting to try instead of the user's, with the address that results.
 struct Other {
-  FindingKind finding_kind{};  // the finding that is reported if the setting helps
+  FindingKind finding_kind{};  // kind of the finding that is reported if readings succeed with the setting
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the setting to try, "baud=9600"
   EncoderAddress address{};
@@ -28,7 +28,7 @@ struct Other {
 
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
-/// Returns a search on the port of the address, with the user's settings of latency and RS-485.
+/// Returns a search for encoders on the port of the address, with the user's settings of latency and RS-485.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
 /// Returns whether at least 8 of 10 readings are good and chance (Fisher's exact test) is unlikely.

@@ -229,7 +229,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Texts that replace those of `table` for one kind of port; "": keeps the text of `table`.
+/// Texts of a finding for one kind of port, which replace the texts in `table`; "": the text of `table` stays.
 struct Elsewhere {
   FindingKind finding_kind;
   PortKind place;

@@ -22,8 +22,8 @@ class Attended final : public Machine<Item> {
 
   void feed(const Event<Item>& event) override {
     if (event.kind == Event<Item>::Kind::timer) {
-      // A timer event before the time of the encoder's timer only serves to call `look`, so the encoder does not get
-      // it.
+      // A timer event that comes before the time for which the encoder waits is only an occasion to call `look`. It is
+      // not passed to the encoder.
       if (event.at < timer_) return;
       timer_ = never;
     }
@@ -35,7 +35,8 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // A wait for a time that has passed starts no timer, unless the encoder repeats the wait for its present timer.
+    // A wait of the encoder for a time that has passed needs no timer event, unless it is the wait whose timer is still
+    // running.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;

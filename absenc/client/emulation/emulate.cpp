@@ -170,7 +170,7 @@ struct Emulation::Running {
   // returns the counts of requests so far; only the encoder's thread sets and calls it
   std::function<RequestCounts()> count_requests;
 
-  std::jthread thread;  // last member, because the thread uses all other members
+  std::jthread thread;  // declared last, because the thread uses all other members of this object
 };
 
 Emulation::Emulation(std::string_view text, const EmulateChoices& choices)

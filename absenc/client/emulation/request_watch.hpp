@@ -84,7 +84,8 @@ class RequestWatch final : public Machine<Item> {
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // If the bytes may be reported so late that the reply fits into the delay, the host may have waited for the reply.
+    // The port may report bytes late. If a reply fits into this delay, the host may have waited for the reply although
+    // the bytes seem to follow without a pause.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;

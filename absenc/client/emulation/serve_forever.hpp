@@ -65,7 +65,7 @@ template <class Item, class Open, class Wait, class Told>
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
-      // A port that is open and does not support a rate will not support it after a new attempt either.
+      // An open port that does not support a rate will not support it after it is opened again.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
       if (is_open) told(PortEvent::away, failure.what());

@@ -29,7 +29,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Time first_request = 20us;              // time from power-on to the first request
+// time that passes in the drawing between power-on and the first request
+constexpr Time first_request = 20us;
 constexpr std::uint64_t fastest = 1'000'000'000;  // highest sample rate: the drawing has a resolution of 1 ns
 
 // Returns the idle time that decoders need before the first and after the last character.
@@ -145,7 +146,7 @@ capture::ScratchFile scratch_file(const std::string& path) {
 void write_drawing(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing,
                    const LineSettings& line) {
   const FileFormat format = format_of(path);
-  if (format == FileFormat::sigrok) {  // the sigrok writer replaces an existing file itself
+  if (format == FileFormat::sigrok) {  // an existing file needs no removal: the sigrok writer replaces it itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
     return capture::write_sigrok(path, drawing, choices.samples_per_second == 0 ? usual : choices.samples_per_second);
   }

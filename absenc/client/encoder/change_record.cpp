@@ -77,7 +77,7 @@ void ChangeRecord::look_at_memory() {
   }
 }
 
-// Finds the old value of the setting. Stores none if it is uncertain which field of the reply the command sets.
+// Finds the old value of the setting. Stores no value if it is uncertain which field of the reply the command sets.
 void ChangeRecord::find_old_value(bool good) {
   if (!old_ || arguments_.empty()) return;
   if (std::ranges::count_if(command_.arguments, &Argument::required) != 1) return;

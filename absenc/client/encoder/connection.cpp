@@ -268,7 +268,8 @@ class ConnectionOn final : public Connection {
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }
 
-  // Tells the unit that other encoders share the line, so that conversations do not change settings of the line.
+  // Tells the unit that other encoders share the line: then its conversations must not change the line's baud rate and
+  // other line settings.
   void tell_of_company() {
     Options options = uri().options;
     tell_shared(unit(), options);
@@ -284,7 +285,8 @@ class ConnectionOn final : public Connection {
             port_.take_aborted(),  conversation->reading(), {}};
   }
 
-  // Adds to the message that replies came late, because a late reply has other causes than a missing one.
+  // Adds a sentence to the error message if replies came after their timeout, because late replies have other causes
+  // than missing ones.
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;

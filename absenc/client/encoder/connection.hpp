@@ -25,7 +25,8 @@ struct Outcome {
   // whether a signal ended the command early, after the command had restored the encoder
   bool aborted = false;
   const Reading* reading = nullptr;  // the reading; null if the command failed or reads no position
-  Change change{};                   // state of the change, for a command that changes the encoder; otherwise none
+  // whether the encoder was changed, for a command that changes it; the state `none` for other commands
+  Change change{};
 };
 
 class Connection {
@@ -78,7 +79,7 @@ class Connection {
   /// Sets a function that is polled during waits; true ends them with os::Ended. Empty: none.
   virtual void end_when(std::function<bool()> over) = 0;
 
-  /// Uses these options from the next command on, without opening the port again.
+  /// Sets the options with which the encoder is reached from the next command on, without opening the port again.
   virtual void set_options(const Options& options);
 
   [[nodiscard]] const EncoderAddress& uri() const { return uri_; }

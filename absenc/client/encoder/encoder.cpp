@@ -94,7 +94,7 @@ std::function<bool()> Encoder::end_when(std::function<bool()> over) {
 
 struct Samples::Parts {
   Encoder* encoder;
-  std::uint64_t count;  // number of samples to take; 0: no limit
+  std::uint64_t count;  // number of samples that the range has; 0: no limit
   Time deadline;
   Pace pace;
   Sample sample{};

@@ -159,7 +159,7 @@ TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   EXPECT_GT(elsewhere, 1u);
 }
 
-// Catches std::exception, as `main` of the examples does.
+// Checks that `Cancelled` can be caught as std::exception, as `main` of the examples does.
 TEST(ClientEncoder, CancelIsAStandardExceptionAndTheEncoderCanBeUsedAgain) {
   Encoder encoder = open("sim:tformat?singleturn=7");
   encoder.cancel();
@@ -376,7 +376,8 @@ TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
                EncoderFailure);
   change.settle();
   EXPECT_EQ(change.written(), some_bytes(3));
-  EXPECT_EQ(change.unknown(), MemoryImage{});  // the request that would write the fourth byte was not sent
+  // the encoder was switched off after the third byte, so the request for the fourth byte was not sent
+  EXPECT_EQ(change.unknown(), MemoryImage{});
   EXPECT_EQ(change.state(), ChangeState::not_sent);
   EXPECT_EQ(change.not_written().size(), 3u);
   emulation.power_on();

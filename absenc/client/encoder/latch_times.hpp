@@ -47,10 +47,10 @@ class ArrivalSpread {
 
  private:
   static constexpr Time one_second = std::chrono::seconds(1);
-  static constexpr int average = 16;  // number of readings over which the usual pause is averaged
+  static constexpr int average = 16;  // number of readings over which the usual pause between two readings is averaged
 
   Time arrived_{};
-  Time usual_{};  // average pause between two readings
+  Time usual_{};  // average pause between two unsolicited readings
   Time second_ends_{};
   Time now_{};  // sum of the times by which pauses in the present second were longer than 5/4 of the usual pause
   Time before_{};

@@ -29,7 +29,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A shaft that stores when it was sampled.
+/// A shaft that records the times at which the encoder measured it.
 struct WatchedShaft final : Shaft {
   explicit WatchedShaft(std::function<double(double)> motion) : turns(std::move(motion)) {}
   [[nodiscard]] double place(Time at) const { return turns(std::chrono::duration<double>(at).count()); }
@@ -106,7 +106,8 @@ std::vector<Case> cases() {
   return all;
 }
 
-// Returns the speed of the shaft. One revolution moves a linear encoder over its whole range, so it is slower there.
+// Returns the speed of the simulated shaft. One revolution moves a linear encoder over its whole range, so the shaft of
+// a linear encoder turns more slowly.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
@@ -244,7 +245,8 @@ TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
     Busy busy(
         GetParam(), [=](double seconds) { return swing * std::sin(2 * M_PI * seconds); }, most, 1);
     if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
-    std::map<Time, Time> truths;  // the true latch time of each reading, by the lower of its two bounds
+    // true latch time of each reading; the key is the lower bound of the latch time that was computed for the reading
+    std::map<Time, Time> truths;
     std::size_t compared = 0;
     busy.read(600, 3ms, [&](const Reading& reading, const host::LatchTime& at) {
       const std::optional<Time> instant = true_instant(busy.shaft(), reading, at);

@@ -21,7 +21,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time time_between_tries = 250ms;
-constexpr Time between_looks = 20ms;  // period of the checks whether a wait was cancelled
+constexpr Time between_looks = 20ms;  // time between two checks, during a wait, whether the wait was cancelled
 
 host::Unwrapper make_unwrapper(const EncoderAddress& uri) {
   const bool unsolicited = host::sends_unsolicited(*uri.unit, uri.options);

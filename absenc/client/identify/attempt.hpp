@@ -24,22 +24,26 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-/// How long an attempt tries to get a reply from an encoder that does not answer.
+/// Limits of the search for an encoder that may not answer: duration and repetitions.
 struct Effort {
-  Time scan{};              // time without a reply after which a scan ends
-  bool asks_again = false;  // whether silent encoders are asked again: by further requests, and after a silent scan
+  Time scan{};  // a scan of the line ends after this time without any reply
+  // whether an encoder without a reply gets further requests, and a scan without any reply is repeated
+  bool asks_again = false;
 };
 inline constexpr Effort quick{.scan = 150ms};
 inline constexpr Effort thorough{.scan = 5s, .asks_again = true};
 
-inline constexpr unsigned reads = 6;              // intended number of answered readings of each encoder that replies
-inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
-inline constexpr std::size_t stream_size = 2048;  // number of unsolicited bytes or frames after which listening ends
+// number of answered readings after which an encoder that replies is read no more
+inline constexpr unsigned reads = 6;
+inline constexpr Time listening = 100ms;  // time for which the attempt listens before its first request
+// number of unsolicited bytes or frames after which the attempt stops listening
+inline constexpr std::size_t stream_size = 2048;
 inline constexpr unsigned most_unanswered = 3;  // number of unanswered readings after which an encoder is read no more
 inline constexpr Time settled = 5ms;  // duration of silence after which no reply to an earlier request is expected
 inline constexpr Time longest_settling = 200ms;  // limit of the wait for silence, on a line that is never silent
-inline constexpr Time late_window = 100ms;       // time after an unanswered request in which its reply may arrive late
-inline constexpr Time most_allowance = 400ms;    // greatest extension of the timeout if replies are late
+// time after an unanswered request in which a late reply to it may still arrive
+inline constexpr Time late_window = 100ms;
+inline constexpr Time most_allowance = 400ms;  // greatest time by which timeouts are extended if replies come late
 
 /// Collects the addresses of encoders that a scan finds, without those that two encoders share.
 struct ScannedAddresses final : FieldSink {
@@ -173,7 +177,7 @@ class Attempt {
     const Options& options;
     std::vector<ObservedExchange> exchanges{};
     Patience<Item> patience;
-    bool understood = false;  // whether a good reply has arrived in this conversation
+    bool understood = false;  // whether a good reply has been received in this conversation
   };
 
   // Checks a step of the conversation: throws TryEnd to abort the conversation, and extends the step's timeout if
@@ -205,10 +209,10 @@ class Attempt {
   }
 
   struct Conversed {
-    std::size_t heard = 0;  // number of items that an encoder sent in this conversation
+    std::size_t heard = 0;  // number of bytes or frames that an encoder sent in this conversation
     Error error = Error::timeout;
     std::string detail{};  // the unit's explanation of `error`
-    bool ended = false;    // whether the command ran to its end
+    bool ended = false;    // whether the command ran to its end, instead of being aborted
   };
 
   // Runs one conversation and stores its exchanges in `exchanges`. On a line of characters it repeats the conversation
@@ -314,8 +318,8 @@ class Attempt {
     return targets;
   }
 
-  // Polls one encoder and stores the candidates; returns whether the encoder replied. `encoder` is the address setting
-  // of the polled encoder, "": none.
+  // Polls one encoder, stores the candidates for it, and returns whether it replied. `encoder` is the setting with the
+  // encoder's address; "": the encoder has no address.
   bool ask_one(const Command& read, const SettingTexts& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
@@ -350,7 +354,8 @@ class Attempt {
       if (os::interrupted()) throw os::Interrupted{};
       if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
-    // Removes readings without a reply, which may have come too late on a busy computer, and replies of other encoders.
+    // Removes two kinds of readings: those without a reply, which may have come too late on a busy computer, and those
+    // with a reply of another encoder.
     std::erase_if(exchanges, [&](const ObservedExchange& one) {
       return one.reply.frame().empty() || is_of_another(one, options);
     });
@@ -381,13 +386,13 @@ class Attempt {
   Effort effort_;
   LineFindings& findings_;
   EncoderAddress address_;
-  Link link_;  // the open port; must outlive the runner
+  Link link_;  // the open port, to which `runner_` refers
   Runner<Item> runner_;
   std::vector<std::vector<std::uint8_t>> harmful_;  // beginnings of requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
-  bool silent_ = true;          // whether nothing was received after any request
+  bool silent_ = true;          // whether no request was followed by any received byte or frame
   bool asked_ = false;          // whether a conversation was begun, so that a reply to it may still be on the line
-  bool is_unanswered_ = false;  // whether the last request has no reply yet
+  bool is_unanswered_ = false;  // whether no reply to the last request has arrived yet
   Time allowance_{};            // time by which each timeout is extended, because replies were late
 };
 

@@ -60,7 +60,7 @@ std::vector<std::string> settings_for(const Unit& unit, const Options& options) 
     if (by_model.size() <= settings.size()) return by_model;
   }
   if (resolves_to(unit, {}, settings, options)) return settings;
-  // The short list of settings does not give these options, so all options are named.
+  // A list of only the differing settings does not select these options, so the list names all options.
   return option_texts(unit, options);
 }
 

@@ -26,8 +26,8 @@ struct Candidate {
 /// Returns whether the candidate's evidence is too strong for chance.
 [[nodiscard]] bool is_found(const Candidate& candidate);
 
-/// Returns whether the evidence for `one` is about as strong as that for `best`, or stronger, and both are proven or
-/// neither is.
+/// Returns whether the evidence for `one` is at least about as strong as that for `best`, and both candidates are
+/// proven or neither of them is.
 [[nodiscard]] bool is_as_likely(const Candidate& one, const Candidate& best);
 
 /// Sorts the candidates, the likeliest first. `searches` is the number of searches that could each find a candidate by

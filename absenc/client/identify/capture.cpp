@@ -19,8 +19,10 @@ namespace {
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-constexpr std::size_t enough = 300;         // number of replies, good or bad, that are enough evidence
-constexpr std::size_t enough_noise = 3000;  // number of bytes outside of frames that are enough evidence
+// number of replies, good or bad, with which a protocol can be judged, so that decoding stops
+constexpr std::size_t enough = 300;
+// number of bytes outside of frames with which a protocol can be judged, so that decoding stops
+constexpr std::size_t enough_noise = 3000;
 
 /// Thrown to stop decoding when enough of the capture was read.
 struct Enough {};

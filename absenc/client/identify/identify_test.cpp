@@ -194,7 +194,7 @@ TEST(Identify, TheEncoderItselfTellsModelsApartWhoseRepliesAreAlike) {
       ASSERT_FALSE(findings.candidates.empty());
       const Candidate& best = findings.candidates.front();
       EXPECT_EQ(best.unit, unit);
-      // The default options may leave the resolution to the encoder, and then fit each model.
+      // With the default options the encoder may report its resolution itself; then these options fit each model.
       Options usual;
       static_cast<void>(resolve_options(*unit, {}, {}, usual));
       for (const Candidate& one : findings.candidates) {

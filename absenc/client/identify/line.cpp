@@ -24,7 +24,8 @@ namespace {
 // number of unsolicited bytes from which on the search sends no requests on the line
 constexpr std::size_t busy_line = 32;
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
-constexpr double beyond_doubt = -3;         // greatest log10 of a candidate's chance that is beyond doubt
+// a candidate is beyond doubt if chance explains its replies with a probability of at most 10^-3
+constexpr double beyond_doubt = -3;
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
@@ -317,7 +318,7 @@ class Search {
   Time deadline_;
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
-  std::vector<const Unit*> silent_;  // units that got no reply to their first requests
+  std::vector<const Unit*> silent_;  // units whose first requests got no reply; they are tried again later
   std::optional<os::Failure> failure_;
   bool opened_ = false;
 };

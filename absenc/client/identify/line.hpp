@@ -24,22 +24,23 @@ struct LineSearch {
   Time limit{};  // time limit of the whole search for encoders
   std::function<void(const std::string&)> progress{};
   OpenLink open = open_link;
-  std::function<Time()> now = os::now;  // returns the time of the port's clock
+  std::function<Time()> now = os::now;  // the clock of the port: returns its present time
   // polled during the search; once it returns true, the search ends with os::Ended; empty: never
   std::function<bool()> over{};
 };
 
 struct LineFindings {
   std::vector<Candidate> candidates{};
-  std::size_t requests = 0;  // number of requests that were sent
+  std::size_t requests = 0;  // number of requests that the search has sent
   std::size_t heard = 0;     // number of bytes or frames that were received after requests, without echo
   // number of bytes or frames that were received while listening, before the first request at each setting of the line
   std::size_t unsolicited = 0;
   // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
   std::size_t searches = 0;
-  bool only_echo = false;          // whether in some conversation nothing but the adapter's echo was received
-  std::set<std::string> lines{};   // the kinds of lines that were tried, in words
-  std::vector<std::string> notes;  // sentences about impossible attempts and contradictory identities
+  bool only_echo = false;         // whether in some conversation nothing but the adapter's echo was received
+  std::set<std::string> lines{};  // the kinds of lines that were tried, in words
+  // sentences about protocols that could not be tried, and about identities that contradict the options
+  std::vector<std::string> notes;
   bool out_of_time = false;
   bool interrupted = false;
 };

@@ -15,9 +15,10 @@ template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};     // longest time in which no item at all is received, before the conversation ends
-    Time nonsense{};  // longest time in which items but no good reply are received, before the conversation ends
-    bool is_one_request = false;  // whether a single request to which nothing is received ends the conversation
+    Time quiet{};  // longest time without any received byte or frame, after which the conversation ends
+    // longest time with received bytes or frames but without a good reply, after which the conversation ends
+    Time nonsense{};
+    bool is_one_request = false;  // whether the conversation ends as soon as one request got no answer at all
     Time latency{};               // latency of the port, which is added to the timeouts of the conversation's steps
   };
   explicit Patience(const Limits& limits) : limits_(limits) {}
@@ -62,10 +63,10 @@ class Patience {
   }
 
   Limits limits_;
-  std::size_t heard_ = 0;   // number of received items of the conversation
-  bool has_asked_ = false;  // whether a request was begun
+  std::size_t heard_ = 0;   // number of bytes or frames that were received in the conversation
+  bool has_asked_ = false;  // whether the sending of a request has begun
   bool asked_ = false;      // whether the last request was sent
-  bool answered_ = false;   // whether something was received after the last request
+  bool answered_ = false;   // whether any byte or frame was received after the last request
   Time begun_ = never;
   Time missed_{};  // sum of the delays between due events and their handling by this process
   Time due_ = never;

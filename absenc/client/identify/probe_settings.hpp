@@ -28,10 +28,10 @@ enum class Medium : std::uint8_t { serial, tcp, spi, ftdi, can };
 
 [[nodiscard]] bool has_setting(const SettingTexts& settings, std::string_view name);
 
-/// Returns those of the settings that are options of the unit; with `with_model` also the model.
+/// Returns those of `settings` that set options of the unit; with `with_model` also the setting of the model.
 [[nodiscard]] std::vector<OptionText> option_settings(const Unit& unit, const SettingTexts& settings, bool with_model);
 
-/// Returns the request of a command with its default arguments; empty if none can be encoded.
+/// Returns the request of the command with default arguments; empty if the command has no request that can be encoded.
 [[nodiscard]] std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command);
 
 /// Returns the sets of settings to try in addition to `settings`, at most 8: no further setting, and models and single

@@ -36,7 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// Returns the header lines of a dump, which state protocol, model and options and must match those of the encoder.
+// Returns the lines at the beginning of a dump with protocol, model and options, which must be those of the encoder.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;

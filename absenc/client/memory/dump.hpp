@@ -11,7 +11,7 @@ namespace absenc::client {
 
 struct Dump {
   MemoryImage image;
-  // whether the dump has a right checksum, or states "edited"
+  // whether the checksum of the dump is right, or the dump states instead that it was edited
   bool checked = false;
 };
 

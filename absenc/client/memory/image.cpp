@@ -85,7 +85,8 @@ std::string to_text(const Unit& unit, MemoryAddress at) {
 }
 
 std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
-  std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges as text, by the number of their page
+  // for each page, its address ranges as text, as "0x00 to 0x7E"
+  std::map<std::uint32_t, std::vector<std::string>> ranges;
   for (const MemoryRun& run : runs(image)) {
     std::string text = fmt::format("0x{:02X}", run.first.address);
     if (run.words.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.words.size() - 1);
@@ -93,7 +94,7 @@ std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
   }
   std::vector<std::string> pages;
   for (auto page = ranges.begin(); page != ranges.end();) {
-    auto last = page;  // last of the consecutive pages that have the same addresses
+    auto last = page;  // the last one of several consecutive pages whose address ranges are the same
     auto after = std::next(page);
     while (after != ranges.end() && after->first == last->first + 1 && after->second == page->second) last = after++;
     std::string text = fmt::format("{}", fmt::join(page->second, ", "));

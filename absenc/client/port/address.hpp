@@ -85,10 +85,10 @@ inline constexpr std::array<LinkParameter, 31> link_parameters{{
     {"seed", "N", "another series of faults", "sim"},
 }};
 
-/// Returns the option that a setting of this name sets; null: none.
+/// Returns the option of the unit that a setting of this name sets; null if the name is that of no option.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
-/// Returns the link parameter of this name; null if there is none.
+/// Returns the description of the port or line setting with this name; null if there is no such setting.
 [[nodiscard]] const LinkParameter* find_link_parameter(std::string_view name);
 
 struct EncoderAddress {
@@ -134,7 +134,7 @@ inline constexpr std::string_view ftdi_name = "ftdi";
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;
-/// Returns the address of a name; `names` is the content of absenc.toml.
+/// Returns the address that absenc.toml gives to the encoder of this name; `names` is the content of absenc.toml.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
 /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".

@@ -31,7 +31,8 @@ void CanLog::begin(const Step<CanFrame>& step) {
   port_->begin(step);
 }
 
-// Throws Failure, because callers take os::Failure for a lost port and wait for its return.
+// A log file that cannot be written is a Failure: callers take os::Failure for the loss of the port, and wait until the
+// port is back.
 void CanLog::write(const std::string& line) {
   try {
     file_->append(line);

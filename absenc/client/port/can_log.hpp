@@ -30,7 +30,7 @@ class CanLog final : public Port<CanFrame> {
   std::shared_ptr<void> owner_;
   std::shared_ptr<os::LineFile> file_;
   std::string interface_;
-  Time offset_;  // offset from the clock of the port to the time of day
+  Time offset_;  // time of day minus the time of the port's clock
   std::vector<CanFrame> sending_;
 };
 

@@ -10,10 +10,10 @@
 
 namespace absenc::client {
 
-/// Explanation of a bad reply; all texts are empty if there is none.
+/// Explanation of a bad reply; all texts are empty if no explanation was found.
 struct Diagnosis {
-  std::string finding;    // what the received bytes really are
-  std::string advice;     // what the user can try
+  std::string finding;    // origin or kind of the received bytes, such as an echo of the request
+  std::string advice;     // action that the user can try
   std::string setting{};  // model or option "NAME=VALUE" with which the reply would be good; "": none was found
 };
 

@@ -33,7 +33,7 @@ Message message_of(const Unit& unit, const Options& options, const ConversationR
   return {describe(unit.link, Subject::reply, ended.error, ended.detail, diagnosis), diagnosis};
 }
 
-/// Returns the clauses that a message repeats. "Checksum" and "CRC" are taken for the same word.
+/// Returns the parts of a message that occur in it more than once. "Checksum" and "CRC" are taken for the same word.
 std::set<std::string> repeated_clauses(std::string message) {
   for (std::size_t at = 0; (at = message.find("CRC", at)) != std::string::npos;) message.replace(at, 3, "checksum");
   std::set<std::string> once;

@@ -113,7 +113,8 @@ Link open_ftdi(const EncoderAddress& uri) {
 
 Link open_can(const EncoderAddress& uri) {
   Link link;
-  link.place = uri.path;  // names no bit rate, because that of the interface is set by the system, not by absenc
+  // the text names no bit rate, because the system sets the bit rate of the interface, not absenc
+  link.place = uri.path;
   take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
   return link;
 }

@@ -15,7 +15,8 @@ namespace absenc::client {
 struct Link {
   std::unique_ptr<VirtualDevice> device;  // virtual encoder of sim:, null for other ports; must outlive the port
   std::shared_ptr<void> owner;
-  Port<std::uint8_t>* bytes = nullptr;  // the open port for bytes; either this or `frames` is set
+  // the open port if the link carries bytes; exactly one of `bytes` and `frames` is not null
+  Port<std::uint8_t>* bytes = nullptr;
   Port<CanFrame>* frames = nullptr;
   Time latency{};     // delay that the connection between this computer and the line adds to a reply
   int realtime = 0;   // real-time priority, 1 to 99, of threads that use the port; 0: none
@@ -25,7 +26,8 @@ struct Link {
   std::function<bool()> is_data_driven{};
   // returns the clock rate in Hz of the last transfer; null if the port makes no clock
   std::function<std::uint32_t()> clock_rate{};
-  std::vector<std::string> notes;  // hints for the user about the port, as on a setting that slows it
+  // sentences for the user about the port, for example about a driver setting that slows it down
+  std::vector<std::string> notes;
 };
 
 /// Opens the port of the address and returns it; the setting `realtime` makes the calling thread a real-time thread

@@ -14,12 +14,12 @@ namespace absenc::client {
 
 struct NamedEncoder {
   std::string address;  // address without settings, "tformat:/dev/ttyUSB0"
-  std::string place;    // position of the encoder's port in the file, for errors
-  // settings of the encoder itself, and settings of its bus that it does not override
+  std::string place;    // place in absenc.toml at which the port of the encoder is given, for error messages
+  // settings in the section of the encoder, and those in the section of its bus that the encoder's section does not set
   std::vector<FileSetting> settings;
-  // settings of the section [defaults]; those that do not fit the encoder are ignored
+  // settings in the section [defaults]; settings that this encoder cannot have are ignored
   std::vector<FileSetting> defaults;
-  bool has_company = false;  // whether other encoders are on the same bus
+  bool has_company = false;  // whether other encoders in absenc.toml are on the same bus
   double rate_hz = 0;        // readings per second for `serve`; 0: not in the file
 };
 

@@ -27,7 +27,8 @@ struct Attempted {
   std::string advice{};                  // the unit's advice on the error; "": it has none
   Time began{};                          // time at which the command began, by the port's clock
   capture::ObservedExchange exchange{};  // last request and its reply, without echo
-  // bytes received in the last exchange, with echo; for a stream those of its frame; empty on CAN
+  // bytes received in the last exchange, including the echo; for a stream, the bytes of the frame that gave the result;
+  // empty on CAN
   std::vector<std::uint8_t> raw{};
   bool heard = false;            // whether anything was received after the last request; an echo counts, too
   bool answered = false;         // whether something other than an echo was received after the last request
@@ -35,14 +36,16 @@ struct Attempted {
   // number of damaged frames that this command discarded
   std::uint64_t discarded = 0;
   Time answered_after{};  // time from the end of the request to the beginning of the reply; 0 without a reply
-  Time limit{};           // greatest `answered_after` that protocol and connection allow; 0: no limit
-  Time after{};           // time from the end of the request to the end of the reply; meaningless without a reply
-  Time allowed{};         // greatest `after` that the protocol allows for a reply of this length
+  // greatest time to the beginning of the reply (`answered_after`) that protocol and connection allow; 0: no limit
+  Time limit{};
+  Time after{};  // time from the end of the request to the end of the reply; meaningless without a reply
+  // greatest time to the end of the reply (`after`) that the protocol allows for a reply of this length
+  Time allowed{};
   std::optional<Reading> reading{};
-  // value of the first reported field that counts replies; nothing: none was reported
+  // value of the first field of the reply that counts replies; nothing: no field does, or no reply came
   std::optional<std::int64_t> counter{};
   const FieldInfo* counter_field = nullptr;
-  bool possible = true;  // whether the unit can run the command with these options
+  bool possible = true;  // whether the unit has a command that can be run with the options of the encoder
 
   /// Returns whether there is a reply with a time limit and it began after that limit.
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
@@ -87,10 +90,11 @@ class CounterSink final : public FieldSink {
 struct Series {
   std::size_t count = 0;
   Time limit = never;                       // time after which no further run begins
-  Time patience = std::chrono::seconds(2);  // time without a good reply that ends the series
-  std::size_t most_silent = 8;              // number of runs after which the series ends if none received anything
-  Time least{};                             // shortest time before `most_silent` can end the series
-  std::size_t most_bad = 24;                // number of runs after which the series ends if no reply was good
+  Time patience = std::chrono::seconds(2);  // longest time without a good reply; then the series ends
+  // number of runs without any received byte or frame after which the series ends
+  std::size_t most_silent = 8;
+  Time least{};               // the series does not end because of `most_silent` before this time
+  std::size_t most_bad = 24;  // number of runs without a good reply after which the series ends
 };
 
 template <class Item>
@@ -202,7 +206,8 @@ class Runner {
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // Each attempt has a time limit of its own, because on a line that is never silent an attempt might not end.
+    // Each attempt to run the command has a time limit of its own: on a line that is never silent the attempt might not
+    // end.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -234,7 +239,7 @@ class Runner {
 
   // ---- Listening without a request
 
-  /// Listens for `time`, but ends earlier if `on_items(items)` returns false.
+  /// Listens for `time` and passes received bytes or frames to `on_items`; ends early if `on_items` returns false.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -275,9 +280,9 @@ class Runner {
 
   /// Returns how many good replies were followed by further bytes before the next request.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
-  /// Returns the greatest number of further items that followed a good reply.
+  /// Returns the greatest number of further bytes or frames that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
-  /// Returns all items of the last exchange whose good reply was followed by further items.
+  /// Returns all received bytes or frames of the last exchange in which further ones followed the good reply.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
   /// Copies the last exchange into `one`, the result of the last command.
@@ -366,8 +371,8 @@ class Runner {
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // Stores the length of the echo. A new session does not know the echo of a request before it, so the greater length
-  // counts.
+  // Stores the length of the echo in the last exchange. A new session does not know the echo of a request before it, so
+  // the greater of the known lengths is stored.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
@@ -387,16 +392,18 @@ class Runner {
   std::unique_ptr<std::byte[]> storage_;
   Filter filter_;
   std::optional<host::Session<Item>> session_;
-  bool open_ = false;                  // whether the last exchange must still be passed to `on_exchange`
+  bool open_ = false;                  // whether the last exchange has not been passed to `on_exchange` yet
   std::uint64_t opened_at_ = 0;        // number of requests that were sent before the open exchange began
   std::uint64_t requests_before_ = 0;  // number of requests that were sent before the present command
-  // number of items that were received before the present command began, and belong to an older request
+  // number of bytes or frames that were received before the present command began; they belong to an older request
   std::size_t received_before_ = 0;
-  std::uint64_t unanswered_ = 0;   // number of requests without reply in the present command
-  std::uint64_t late_ = 0;         // number of late replies, without one in the last exchange
+  std::uint64_t unanswered_ = 0;  // number of requests without reply in the present command
+  // number of late replies so far; a late reply in the last exchange is not counted yet
+  std::uint64_t late_ = 0;
   std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // number of received items when the last command ended without an error; else 0
+  // number of received bytes or frames at the end of the last command, if it ended without an error; else 0
+  std::size_t answered_ = 0;
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;

@@ -88,7 +88,8 @@ TEST(Runner, AReplyThatComesTwiceIsNotTakenForAnEcho) {
   EXPECT_EQ(one.exchange.reply.bytes, one.raw);
   EXPECT_EQ(one.raw.front(), 0x1A);
   for (int i = 0; i < 2; ++i) {
-    bench.runner.settle(1ms, 10ms);  // without this wait the reply would collide with the next request
+    // waits until the line is silent: the repeated reply would collide with the next request
+    bench.runner.settle(1ms, 10ms);
     EXPECT_EQ(bench.once().error, Error::none);
   }
   EXPECT_EQ(bench.runner.session().echo().mode(), host::EchoMode::off);
@@ -209,7 +210,7 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
   EXPECT_EQ(bench.runner.session().counters().discarded, 0u);
 }
 
-// A single good frame between damaged frames is discarded like these.
+// If damaged frames surround a single good frame, the good frame is discarded as well.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));

@@ -151,7 +151,7 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
-  std::size_t dots = 0;  // number of dots in the dotted name that is being read
+  std::size_t dots = 0;  // number of dots in the name of a table or setting that is being read
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
       case '#':
@@ -234,7 +234,7 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      // the file type is `none` for a symbolic link that leads to itself
+      // std::filesystem reports the file type `none` for a symbolic link that leads to itself
       if (type == fs::file_type::not_found || type == fs::file_type::none) {
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }

@@ -96,10 +96,11 @@ class SharedLink {
 /// they are, but their line settings differ.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
-/// Throws UsageError if the encoders cannot be read at the same time.
+/// Checks that all these encoders can be read at the same time. Throws UsageError if not.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
-/// Returns the open link of the same line, or opens a new one. Throws os::Failure, UsageError, Failure.
+/// Returns the link that is already open for the line of this address, or opens a new one. Throws os::Failure,
+/// UsageError, Failure.
 [[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 
 }  // namespace absenc::client

@@ -24,10 +24,11 @@ struct DeviceSettings {
   std::vector<std::string> conditions;  // conditions, each as NAME=VALUE, set before power-on
   std::vector<std::string> alarms;      // names of alarms that are raised from the start
   std::vector<std::string> faults;      // faults to inject, each as KIND=RATE
-  bool faults_may_come = false;         // whether faults may be switched on after the start
-  std::uint64_t seed = 1;               // seed of the random faults
+  // whether the encoder is prepared for faults that are switched on only after the start
+  bool faults_may_come = false;
+  std::uint64_t seed = 1;  // seed of the random faults
   Time delay = sim::FaultRates{}.delay;
-  bool real_power_on = false;  // whether power-on takes the start-up time of the document
+  bool real_power_on = false;  // whether the encoder, after power-on, takes as long to start as the document states
 };
 
 /// Parses a fault such as `corrupt=0.01`. Throws UsageError.
@@ -66,12 +67,12 @@ class VirtualDevice {
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 
   [[nodiscard]] const Any<Device>& device() const { return device_; }
-  /// Return the machine that is on the line: `bytes` is null on CAN, `frames` on all other lines.
+  /// Return the machine that is connected to the line. `bytes()` is null on CAN, `frames()` is null on all other lines.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// Returns how often each fault was injected; null if faults were never enabled.
   [[nodiscard]] const sim::FaultCounts* faults() const;
-  /// Returns the number of replies with a fault, as a delay; nothing on CAN, or if faults were never enabled.
+  /// Returns how many replies had a fault such as a delay; nothing on CAN, or if faults were never enabled.
   [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
 
  private:

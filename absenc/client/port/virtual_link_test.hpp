@@ -24,11 +24,13 @@ struct VirtualClock {
 
 /// The properties of the port between the host and the virtual encoder.
 struct VirtualPort {
-  bool echo = false;                      // whether the adapter echoes requests
-  std::optional<std::uint64_t> pauses{};  // seed of random delays before requests; nothing: no delays
+  // whether the simulated adapter sends each request back to the host as an echo
+  bool echo = false;
+  // seed of the random delays by which requests are sent later; nothing: requests are not delayed
+  std::optional<std::uint64_t> pauses{};
   // fault rates of a sim::RoughLine; nothing: the port is a sim::SimPort
   std::optional<sim::RoughRates> rough{};
-  std::uint64_t seed = 1;         // seed of the faults of `rough`
+  std::uint64_t seed = 1;         // seed of the random faults of the line `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event
   std::uint32_t rate = 0;         // baud rate of the host's port in bits per second; 0: that of the encoder
 };

@@ -16,18 +16,18 @@
 
 namespace absenc::client {
 
-/// A request and everything that was received until the next request; items beyond a limit are dropped.
+/// A request and all bytes or frames that were received until the next request; those beyond a limit are dropped.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
-  std::vector<Item> received{};  // received items, including the adapter's echo
-  std::size_t echo = 0;          // number of items at the beginning of `received` that are echo
-  std::size_t clocks = 0;        // number of clocks of the transfer; only on a clocked line
-  Time answer{};                 // limit of the time until a reply begins; 0: no limit
-  Time sent_at{};                // time at which the request ended
+  std::vector<Item> received{};  // received bytes or frames, including the adapter's echo of the request
+  std::size_t echo = 0;          // number of bytes or frames at the beginning of `received` that are the adapter's echo
+  std::size_t clocks = 0;        // number of clocks of the transfer on a clocked line; 0 on other lines
+  Time answer{};                 // longest time from the end of the request to the beginning of the reply; 0: no limit
+  Time sent_at{};                // time at which the last bit of the request was sent
   Time sent_late{};              // uncertainty of `sent_at`: the request may have ended earlier by up to this time
-  Time received_at{};            // time at which the last received item ended
-  /// A time, and how many items of `received` had arrived by then.
+  Time received_at{};            // time at which the last received byte or frame ended
+  /// A time, and how many bytes or frames of `received` had arrived by then.
   struct Mark {
     Time at{};
     std::size_t items = 0;
@@ -59,7 +59,7 @@ struct OutOfTime {};
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
-  /// Reserves memory for received items, so that most exchanges allocate none for them.
+  /// Reserves memory for received bytes or frames, so that most exchanges need no allocation.
   WatchedPort() {
     last.received.reserve(most_kept);
     last.marks.reserve(most_kept);
@@ -113,7 +113,7 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
-  /// Returns whether, since the last call of this function, a conversation was asked to end early.
+  /// Returns whether a conversation was asked to end early since this function was called last.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
   // function that is polled during waits; true ends them with os::Ended
@@ -155,7 +155,7 @@ class WatchedPort final : public Port<Item> {
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
   Time looked_at_{};        // time that was read last from the port's clock
-  std::uint32_t rate_ = 0;  // rate that a conversation set, in bits per second; 0: it set none
+  std::uint32_t rate_ = 0;  // baud or bit rate that a conversation set, in bits per second; 0: no conversation set one
   bool aborted_ = false;
 };
 

@@ -133,22 +133,23 @@ class Hdf5Record final : public RecordFile {
   }
 
   os::BlockFile file_;
-  Hdf5Table table_;  // table in the file; only the writing thread uses it
+  Hdf5Table table_;  // table in the HDF5 file; only the thread that writes the file uses it
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   Hdf5Rows rows_;        // rows that wait to be written
   RecordCounts counts_;  // counts of the rows that wait to be written
-  RecordCounts taken_;   // counts of the rows that are being written now
+  RecordCounts taken_;   // counts of the rows that the thread is writing now
   RecordCounts committed_;
   std::uint64_t size_;
-  // calls of `sync` are numbered: the last that was requested, that is being executed, and that is finished
+  // `sync` numbers its calls. Numbers of the last call that was made, the call that the thread is executing, and the
+  // last call that is finished:
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;
   bool ending_ = false;
-  bool is_last_ = false;  // whether the rows that are being written are the last rows of the file
+  bool is_last_ = false;  // whether the thread is writing the last rows of the file now
   std::exception_ptr failure_;
-  std::jthread thread_;  // last member, because the thread uses all other members
+  std::jthread thread_;  // declared last, because the thread uses all other members of this object
 };
 
 }  // namespace

@@ -94,7 +94,8 @@ void Hdf5Store::attach(hid_t access) {
 }
 
 void Hdf5Store::write(H5FD_mem_t type, std::uint64_t at, Bytes bytes) {
-  // The HDF5 library writes whole objects, so of two overlapping blocks one should contain the other.
+  // The HDF5 library writes whole objects. So if a new block overlaps an older one, one of the two should contain the
+  // other.
   auto next = blocks_.upper_bound(at);
   if (next != blocks_.begin()) {
     auto& [begin, block] = *std::prev(next);

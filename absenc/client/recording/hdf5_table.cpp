@@ -189,7 +189,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
     make(column);
     names += (names.empty() ? "" : ",") + std::string(column.name);
   }
-  // names of the columns in their order, which the oldest format does not store
+  // stores the names of the columns in their order, because the oldest HDF5 file format does not store the order
   put_attribute(file_, "columns", names);
   require(H5Fflush(file_, H5F_SCOPE_GLOBAL));
   store_.commit();

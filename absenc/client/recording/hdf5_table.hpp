@@ -26,7 +26,7 @@ class Hdf5Rows {
 
  private:
   friend class Hdf5Table;
-  std::vector<std::size_t> columns_;  // for each stored column, its index in a row
+  std::vector<std::size_t> columns_;  // for each column of the file, the index of its value in a row
   std::vector<ColumnType> types_;
   std::vector<std::vector<std::uint8_t>> elements_;
   std::uint64_t count_ = 0;

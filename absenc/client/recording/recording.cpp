@@ -80,7 +80,7 @@ Recording::Parts::Parts(const RecordingSettings& settings, Encoder& encoder)
       rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
       started_(date_and_time()) {
   if (settings.every == 0) throw UsageError("`every` is 0, but must be at least 1: 1 writes each reading");
-  static_cast<void>(record_form(settings.path));  // checks the ending of the name before the folder is read
+  static_cast<void>(record_form(settings.path));  // refuses a wrong ending of the file name before the folder is read
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }

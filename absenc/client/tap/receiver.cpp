@@ -20,7 +20,7 @@ Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), plac
 }
 
 Receiver::Receiver() : place_("standard input") {
-  link_.latency = 20ms;  // assumed delay of a pipe between two programs on a busy computer
+  link_.latency = 20ms;  // assumed delay of bytes that another program writes to standard input, on a busy computer
 }
 
 Receiver::~Receiver() { cancel(); }

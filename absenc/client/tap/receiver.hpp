@@ -73,7 +73,7 @@ class Receiver {
   std::string place_;
   Time end_time_ = never;
 
-  mutable std::mutex mutex_;  // the mutex guards the following members up to `cancelled_`
+  mutable std::mutex mutex_;  // guards the members from `changed_` to `cancelled_`, which two threads use
   std::condition_variable changed_;
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;
@@ -83,7 +83,7 @@ class Receiver {
   bool cancelled_ = false;
 
   std::function<bool()> is_over_;
-  std::jthread thread_;  // last member, because the thread uses all other members
+  std::jthread thread_;  // declared last, because the thread uses all other members of this object
 };
 
 }  // namespace absenc::client

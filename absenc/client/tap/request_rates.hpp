@@ -21,11 +21,12 @@ class RequestRates final : public capture::AnnotationSink {
     std::string name{};                 // name of the command that sends such requests; "": no command of the unit does
     std::vector<std::uint8_t> first{};  // bytes of the first request of this kind
     std::uint64_t count = 0;
-    std::uint64_t errors = 0;  // number of requests whose annotation has an error
-    capture::Tick begin = 0;   // tick of the first request
-    capture::Tick last = 0;    // tick of the last request
+    std::uint64_t errors = 0;  // number of requests of this kind whose exchange has an error
+    capture::Tick begin = 0;   // tick at which the first request of this kind began
+    capture::Tick last = 0;    // tick at which the last request of this kind began
 
-    /// Returns the mean number of such requests per second; 0 if their times do not show it.
+    /// Returns the mean number of requests of this kind per second; 0 for a single request, or if all of them arrived
+    /// at the same time.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /

@@ -34,7 +34,7 @@ struct Tap::Parts final : capture::AnnotationSink {
       if (is_over) return end();
       filled = at = 0;
       is_over = !run.advance();
-      --at;  // prepares for the `++at` that then moves to the first new row
+      --at;  // goes before the first new row, because the loop condition moves on by one row
     }
     return &ready[at];
   }

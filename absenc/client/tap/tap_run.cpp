@@ -149,7 +149,8 @@ std::vector<TapRun::LineToTry> TapRun::lines_to_try() {
                               one.settings.stop_bits == address.line.stop_bits);
       });
       if (!known) lines.push_back({address.line, std::move(address)});
-    } catch (const UsageError& error) {  // skips units that do not fit the port or the settings
+      // skips units whose encoders cannot be connected to the port, or that do not have its settings
+    } catch (const UsageError& error) {
       if (!refusal) refusal = error;
     }
   }

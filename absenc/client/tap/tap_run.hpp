@@ -58,7 +58,8 @@ class TapRun {
   struct Sinks;
   struct LineToTry {
     LineSettings settings;
-    std::optional<EncoderAddress> address;  // address of the port with these settings; nothing for standard input
+    // address of the tapped port with the line settings `settings`; nothing for standard input
+    std::optional<EncoderAddress> address;
   };
 
   [[nodiscard]] std::vector<LineToTry> lines_to_try();

@@ -8,9 +8,10 @@
 
 namespace absenc::client {
 
-// The first line of each kind of file, which names the kind:
-inline constexpr std::string_view memory_file_title = "absenc memory 1";  // file with the memory of a virtual encoder
-inline constexpr std::string_view dump_title = "absenc dump 1";           // dump, a copy of the memory of an encoder
+// First line of a file with the memory of a virtual encoder; the line names the kind of the file.
+inline constexpr std::string_view memory_file_title = "absenc memory 1";
+// First line of a dump, which is a copy of the memory of an encoder.
+inline constexpr std::string_view dump_title = "absenc dump 1";
 
 /// Returns the content of a file of at most about 16 MiB; `what` says in errors what the file is. Throws Failure.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);

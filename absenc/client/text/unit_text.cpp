@@ -360,7 +360,8 @@ std::string life_of(const MemoryArea& area) {
 }
 
 std::string_view name_of(LinkKind link) {
-  static constexpr std::array<std::string_view, 5> names{"half_duplex", "full_duplex", "exchange", "clocked", "can"};
+  static constexpr std::array<std::string_view, 6> names{"half_duplex", "full_duplex",           "exchange",
+                                                         "clocked",     "clocked_bidirectional", "can"};
   return names[static_cast<std::size_t>(link)];
 }
 
@@ -373,8 +374,8 @@ std::string rate_text(std::uint32_t bits_per_second) {
 std::string line_of(const Unit& unit) { return line_of(unit.link, unit.line); }
 
 std::string line_of(LinkKind link, const LineSettings& line) {
-  static constexpr std::array<std::string_view, 5> words{"RS-485 half duplex", "full-duplex UART", "SPI",
-                                                         "clocked bits", "CAN"};
+  static constexpr std::array<std::string_view, 6> words{
+      "RS-485 half duplex", "full-duplex UART", "SPI", "clocked bits", "clocked bits in both directions", "CAN"};
   const std::string_view kind = words[static_cast<std::size_t>(link)];
   if (line.rate == 0) return fmt::format("{}, baud to be given", kind);
   return fmt::format("{}, {}", kind, rate_text(line.rate));

@@ -40,7 +40,8 @@ struct RoleArgument {
   Role role;
   std::int64_t value;
 };
-/// Returns the command's arguments: for each the value of its role, or else its default.
+/// Returns the arguments of the command. An argument whose role is in `values` gets the value given there, every other
+/// one its default.
 [[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
                                                        std::initializer_list<RoleArgument> values);
 

@@ -127,6 +127,7 @@ WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view
       frame.can = parse_can(what, text);
       break;
     case LinkKind::clocked:
+    case LinkKind::clocked_bidirectional:
       parse_bits(what, text, frame);
       break;
     default:

@@ -243,7 +243,7 @@ constexpr Declaration<Protocol, Encoder> declaration{
     .bits = bits_of_field,
     .conditions = conditions,
     .timing = {.turnaround = turn_around[0],
-               // Time after which the host reports a missing reply, at the slowest rate.
+               // Time after which the host reports that a reply is missing, at the slowest of the baud rates.
                .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit},
 };
 

@@ -38,7 +38,8 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
-/// Kind of request: the number added to the address; for zero and reset the second byte.
+/// Kind of request. Its value is the number that the first byte adds to the encoder's address, but for zero and reset
+/// the second byte of the request.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 /// A request to the encoder.
@@ -65,9 +66,9 @@ struct Reply {
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = amt21::Format;
-  /// Type of requests to the encoder.
+  /// C++ type of the requests to the encoder.
   using Request = amt21::Request;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = amt21::Reply;
   static constexpr std::size_t longest_reply = 2;  ///< Greatest length of a reply in bytes.
 
@@ -96,7 +97,7 @@ struct Protocol {
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.empty()) return Error::wrong_length;
-    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // low bits 11 are a reserved request code
+    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // a first byte whose two lowest bits are 11 is reserved
     if (bytes.size() != request_size(format, bytes)) return Error::wrong_length;
     const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
                           static_cast<std::uint8_t>(bytes[0] & 0xFC)};

@@ -57,7 +57,7 @@ struct Found {
 };
 using Wire = std::vector<std::uint8_t>;
 
-constexpr std::uint8_t damaged = 0x55;  // stands for a character that the host receives damaged
+constexpr std::uint8_t damaged = 0x55;  // a reply byte of this value reaches the host as a damaged character
 
 /// Runs a conversation in virtual time; `encoder` returns the reply to the n-th request.
 struct Bench {
@@ -147,7 +147,7 @@ TEST(Procedures, EndWithoutAValidReply) {
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
   ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request is sent once, and the second three times
-  // The time in which the host waits for the missing reply is part of the pause before the repetition.
+  // The pause of 2 ms before the third attempt includes the 1 ms in which the host waited for the missing reply.
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
 }
@@ -175,7 +175,8 @@ TEST(Procedures, RefusalEndsTheExchangeAtOnce) {
 
 TEST(Engine, WeakChecksumNeedsSilence) {
   const auto longer = [](std::uint8_t request, unsigned) { return Wire{static_cast<std::uint8_t>(request | 0x80), 0}; };
-  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // bytes after a complete reply are ignored
+  // without `ends_by_silence` the host ignores bytes after a complete reply
+  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);
   EXPECT_EQ(Case<two_questions>(longer, {.ends_by_silence = true}).host.error(), Error::wrong_length);
   EXPECT_EQ(Case<two_questions>(echo, {.ends_by_silence = true}).host.error(), Error::none);
 }
@@ -183,7 +184,7 @@ TEST(Engine, WeakChecksumNeedsSilence) {
 TEST(Engine, TheLineIsSilentBeforeEachRequest) {
   Case<two_questions> good(echo, {.silence = 20ms});
   EXPECT_EQ(good.bench.sent[0], 20ms);
-  // The longer of the pause (10 ms) and the silence (20 ms) decides.
+  // The second request follows the first reply after the longer of the pause (10 ms) and the silence (20 ms).
   EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);
 }
 
@@ -219,7 +220,8 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  // 500 parts run one after the other; the storage could not hold the frames of all of them at once.
+  // The procedure awaits 500 parts one after the other. Its storage could not hold the coroutine frames of all parts at
+  // once.
   for (int i = 0; i < 500; ++i) {
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;

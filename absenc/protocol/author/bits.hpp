@@ -9,7 +9,7 @@
 
 namespace absenc::author {
 
-/// Returns the range of `count` bits from bit `first` of byte number `byte` on; none for 0 bits.
+/// Returns the range of `count` bits from bit `first` of byte number `byte` on; no range if `count` is 0.
 [[nodiscard]] constexpr BitRanges bits_of(std::size_t byte, std::size_t first, std::size_t count) {
   BitRanges ranges;
   if (count != 0) ranges.push_back({8 * byte + first, count});

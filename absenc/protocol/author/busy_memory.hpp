@@ -10,11 +10,12 @@ namespace absenc::author {
 
 /// How often and how long a host repeats a request to a busy memory.
 struct BusyWait {
-  /// How long after the first valid reply the host still repeats the request; then it reports Error::busy.
+  /// Time after the first valid reply for which the host repeats its request while the memory is busy; then it reports
+  /// Error::busy.
   Time limit;
   Time pause;             ///< Pause from a valid reply to the repetition of the request.
   unsigned attempts = 1;  ///< How often each request is sent, at most, until its reply is valid.
-  /// Whether a reply is the result only after at least one reply has reported the memory busy.
+  /// Whether the host accepts a reply as the result only after at least one reply has reported the memory busy.
   bool after_busy = false;
 };
 

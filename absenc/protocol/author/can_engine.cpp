@@ -50,7 +50,7 @@ void CanEngine::keep(const CanFrame& frame, Time at) {
 }
 
 void CanEngine::end() {
-  state_ = State::over;  // the conversation ends, unless `over` continues it
+  state_ = State::over;  // the conversation ends, unless the virtual function `over` continues it
   over();
 }
 

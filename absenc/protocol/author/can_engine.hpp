@@ -27,7 +27,7 @@ class CanEngine : public Conversation<CanFrame> {
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step that the port must take.
   Step<CanFrame> next(Time now) final;
-  /// Puts no fields; the subclass Reported (command.hpp) puts them.
+  /// Puts no fields of a result; the subclass Reported (command.hpp) overrides this function and puts them.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
@@ -89,14 +89,14 @@ class CanEngine : public Conversation<CanFrame> {
   bool disturbed_ = false;
   bool receives_early_ = false;
   bool early_ = false;
-  bool listens_ = false;  // frames are received without a request
+  bool listens_ = false;  // true: the host only receives frames, without a request
   std::uint32_t rate_ = 0;
   CanFrame request_{};
   CanFrame relevant_{};
   Time silence_{};   // receiving ends after this time without any frame; 0: receiving lasts exactly `duration_`
   Time duration_{};  // longest duration of receiving
-  Time since_{};     // frames that were complete before this time are early (see `overhear`)
-  Time until_{};     // end of receiving; before the request is sent: earliest time to send it
+  Time since_{};     // frames that were complete before this time are delivered only after `overhear`
+  Time until_{};     // time at which receiving ends or, before the request is sent, earliest time to send the request
   Time sent_at_{};
   Time relevant_at_{};
   Outcome outcome_{};

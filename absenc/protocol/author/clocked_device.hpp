@@ -36,14 +36,14 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   virtual void clocked(Time at, std::size_t clocks) = 0;
   /// Makes the encoder drive the data line low for `time` after the last clock edge. Call it from `selected`.
   void hold_low(Time time) { low_after_ = time; }
-  /// Sets how many of the driven bits hosts read. Call it from `selected`.
+  /// Sets how many of the driven bits hosts read, counted from the first. Call it from `selected`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:
   DrivenBits bits_;
   Time low_after_{};
-  std::size_t taken_ = 0;  // number of driven bits that hosts read; 0: all bits
-  bool pending_ = false;   // the step that drives `bits_` has not been returned yet
+  std::size_t taken_ = 0;  // number of the driven bits that hosts read, counted from the first; 0: all bits
+  bool pending_ = false;   // true: `next` has not yet returned the step that drives `bits_`
   bool driving_ = false;
 };
 

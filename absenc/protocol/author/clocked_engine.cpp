@@ -22,7 +22,7 @@ void ClockedEngine::finish(Error error) {
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  // A lambda, because the compiler would first fill a plain variable with zeros.
+  // The step is made by a lambda, because the compiler would first fill a plain variable with zeros.
   ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
@@ -50,7 +50,7 @@ void ClockedEngine::feed(const ByteEvent& event) {
   if (state_ != State::clocking) return;
   if (event.kind == ByteEvent::Kind::sent) {
     sent_at_ = event.at;
-    // Computed with 32 bits, because a processor without division is slow with 64.
+    // The duration of the transfer is computed with 32 bits, because a processor without division is slow with 64.
     if (times_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / times_.rate));
   }
   if (event.kind != ByteEvent::Kind::received) return;
@@ -64,13 +64,14 @@ void ClockedEngine::received(const ByteEvent& event) {
   size_ = std::min(event.items.size(), whole);
   std::copy_n(event.items.begin(), size_, storage_.begin());
   if (size_ < whole) return finish(Error::wrong_length);
-  // Zeros on a line that was idle high are a position; a line that was always low is shorted.
+  // If all bits are 0 and the data line was low before the transfer, too, the line is shorted. Zeros on a line that was
+  // idle high are a position.
   if (event.idle_low) {
     std::uint8_t any = 0;
     for (const std::uint8_t byte : storage_.first(size_)) any |= byte;
     if (any == 0) return finish(Error::line_stuck);
   }
-  state_ = State::over;  // the conversation ends, unless `clocked` begins another transfer
+  state_ = State::over;  // the conversation ends, unless the virtual function `clocked` begins another transfer
   clocked({Bytes(storage_).first(size_), count_});
 }
 

@@ -28,15 +28,15 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts no fields; the subclass Reported (command.hpp) puts them.
+  /// Puts no fields of a result; the subclass Reported (command.hpp) overrides this function and puts them.
   void report(FieldSink&) const override {}
   /// Returns the bits of the last transfer, as bytes, and its times.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
-  /// Returns the time of the first clock edge of the last transfer; without a known clock rate, the earliest possible
-  /// time.
+  /// Returns the time of the first clock edge of the last transfer; if the clock rate is not known, the earliest time
+  /// at which this edge is possible.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the time at which the last transfer was received completely.
   [[nodiscard]] Time received_at() const { return received_at_; }

@@ -30,7 +30,8 @@ concept Clocked = requires {
 };
 
 struct Later {};
-/// Argument of the constructor of ClockedHostOf: the host begins no transfer until its subclass begins one.
+/// Argument of the constructor of ClockedHostOf that selects a host without a first transfer: its subclass begins the
+/// first one.
 inline constexpr Later later{};
 
 /// A conversation on a clocked line with decoded replies; a subclass handles the bits.
@@ -39,7 +40,7 @@ class ClockedHostOf : public ClockedEngine {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Returns the format of the encoder.
@@ -101,7 +102,7 @@ class ClockedHostOf : public ClockedEngine {
 template <Clocked P>
 class ReadClocked : public ClockedHostOf<P> {
  public:
-  /// Reads from an encoder with this format.
+  /// Constructs a conversation that reads an encoder of this format.
   explicit ReadClocked(const typename P::Format& format) : ClockedHostOf<P>(format) {}
 
  private:

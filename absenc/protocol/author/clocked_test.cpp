@@ -31,8 +31,8 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host that repeats a transfer, with 16 clocks plus the first received byte, until it has made more transfers than
-/// that byte says.
+/// A host that repeats a transfer of 16 clocks plus the value of the first received byte, until it has made more
+/// transfers than that value.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}

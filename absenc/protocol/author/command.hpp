@@ -15,7 +15,7 @@
 
 namespace absenc::author {
 
-/// A conversation that has already ended with an error.
+/// A conversation that sends nothing, because it has ended with an error from the start.
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
@@ -23,7 +23,7 @@ class Refusal final : public Conversation<Item> {
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
   /// Ignores every event.
   void feed(const Event<Item>&) override {}
-  /// Returns the step `done`.
+  /// Returns the step `done`, which ends the conversation.
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return why_; }
@@ -48,7 +48,7 @@ struct ItemOf<P> {
 };
 }  // namespace detail
 
-/// The item that the line of the protocol `P` carries: `P::Item`, or else a byte.
+/// C++ type of the items that the line of the protocol `P` carries: `P::Item`, or a byte if `P` declares none.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
@@ -60,11 +60,11 @@ struct Report {
   using Protocol = P;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
-  /// Items that the line carries.
+  /// C++ type of the items that the line carries: bytes or CAN frames.
   using Items = std::span<const ItemOf<P>>;
 
   /// Puts the fields of a request into the sink. The template `put_values` makes such a function.
@@ -79,7 +79,7 @@ struct Report {
   /// Writes the detail of the error of `host`, used instead of the details that `explain` and `explain_host` return.
   /// Null: their details are used.
   void (*tell)(Sentence&, const Host& host) = nullptr;
-  /// Advice for the error that the line is never silent.
+  /// Advice for people when an error is reported because the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
@@ -87,10 +87,10 @@ struct Report {
 /// conversation.
 template <class Subject, class T>
 struct Finding {
-  /// Type of the object that `put` and `put_left` get besides the result: the format, or a base class of the
+  /// C++ type of the object that `put` and `put_left` get besides the result: the format, or a base class of the
   /// conversation.
   using Of = Subject;
-  /// Type of the procedure's result.
+  /// C++ type of the procedure's result.
   using Found = T;
 
   /// Puts the fields of the result of a successful procedure into the sink.
@@ -103,7 +103,7 @@ struct Finding {
   std::string_view (*left)(const T&) = nullptr;
 };
 
-/// Puts the fields of the struct that `values(what...)` returns into `sink`.
+/// Calls `values(what...)`, which returns a struct, and puts the fields of this struct into `sink`.
 template <const auto& fields, auto values, class... What>
 constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
@@ -192,7 +192,7 @@ constexpr bool asks_by_pulse(const typename P::Format& format, const typename P:
   return P::manner(format, request).pulse != Time{};
 }
 
-/// Empty request, for protocols whose host sends nothing but clocks.
+/// C++ type of an empty request, for protocols whose host sends nothing but clocks.
 struct NoRequest {};
 
 /// Declaration of a command: its description, its request, and the conversation that executes it.
@@ -200,7 +200,7 @@ template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
@@ -224,7 +224,7 @@ struct CommandOf {
     one.missing = why;
     return one;
   }
-  /// Returns a copy that is possible only for formats for which `is_possible` is true.
+  /// Returns a copy of this command that is possible only for formats for which `is_possible` returns true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;

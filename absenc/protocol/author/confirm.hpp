@@ -16,12 +16,13 @@ namespace absenc::author {
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:
-  /// Reads from an encoder of this format with `request`.
+  /// Constructs a conversation that reads an encoder of this format by the request `request`.
   ReadConfirmed(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // `reading_` is set only if no error occurred
+    // the result is `reading_`, which is set only if no error occurred
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "absenc/protocol/author/bit_host.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/author/text.hpp"
@@ -21,11 +22,11 @@ template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.
   using Protocol = P;
-  /// Type of the protocol's virtual encoder.
+  /// C++ class of the protocol's virtual encoder.
   using Encoder = VirtualEncoder;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
 
   std::string_view id{};        ///< Identifier: the part of an address before the colon.
@@ -56,8 +57,9 @@ struct Declaration {
   /// Returns whether the options do not contradict each other. Null: they never do.
   bool (*is_usable)(const Format&) = nullptr;
   /// Returns the request that a reply captured without one is taken to answer, or an error.
-  Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins so. Null: P::longest_reply.
+  Result<Request> (*guess_request)(const Format&, ContentOf<P> reply) = nullptr;
+  /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins with these bytes. Null:
+  /// every reply is assumed to have the length P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
   /// Returns the error to report for the reply to an invalid request. Null: `error`, the request's own error.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
@@ -77,7 +79,8 @@ struct Declaration {
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
   /// Returns whether the encoder answers a request. Null: as Protocol::manner states, if the host sends requests.
   bool (*is_answered)(const Options&, Frame request) = nullptr;
-  /// Returns whether the checks must detect a flip of this bit of a valid reply; null: every bit.
+  /// Returns whether the checks must detect that this bit of a valid reply is flipped; null: they must detect every
+  /// flipped bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Returns the bits of a valid reply that carry a field. Without this function they are unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
@@ -90,13 +93,16 @@ struct Declaration {
   /// For clocked links: returns the index of the bit of a reply that answers the level of the clock line in the pause;
   /// null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
+  /// For bidirectional clocked links: returns the ranges of bits of this burst that the host sends, in their order.
+  BitRanges (*host_bits)(const Options&, Frame burst) = nullptr;
   /// Returns the alarms that an encoder with these options can report; null: it can report all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   /// Constructs a Follower, which finds frames that are composed of several exchanges; null: there are no such frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
-  std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
+  /// Number of bytes of storage that `follower` needs for the Follower that it constructs.
+  std::size_t follower_storage = 0;
   const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.
   const FieldInfo* alarms = nullptr;          ///< Field that describes the flags of Reading::alarms; null: none.
   const FieldInfo* second_status = nullptr;   ///< Field of the status of channel 2; null: none.
@@ -105,7 +111,8 @@ struct Declaration {
   std::span<const RegisterInfo> registers{};  ///< Registers of the encoder that hosts can access.
   std::span<const Condition> conditions{};    ///< Conditions of the virtual encoder's environment that users can set.
   LineTiming timing{};                        ///< Times of the line, which decoding captures needs.
-  const Unit* over_spi = nullptr;  ///< The unit of the same encoder on SPI, if that is another unit; null: it is not.
+  /// The unit that describes the same encoder behind an SPI controller; null: there is no such unit.
+  const Unit* over_spi = nullptr;
 };
 
 /// Returns the format whose members have the values `values` of `options`.

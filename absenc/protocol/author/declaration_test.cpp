@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A protocol whose reply is the request plus one.
+// A protocol whose reply is one byte: that of the request plus one.
 struct Toy {
   struct Format {
     unsigned bits = 8;

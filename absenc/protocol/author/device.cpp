@@ -8,7 +8,8 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// Shortest time that a host is assumed to wait: a pseudo-terminal alone may delay by this time.
+// Shortest time that a host is assumed to wait for a reply, because a pseudo-terminal alone may delay a reply by this
+// time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
 // Greatest number of consecutive replies during which a request is no rule breach because this program may be late.
 constexpr unsigned most_excuses = 2;
@@ -29,7 +30,8 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  // A request may be for another encoder that is absent, so no bytes are expected: any pause ends its reply.
+  // While this encoder skips the reply of another encoder, no bytes are expected, because that encoder may be absent:
+  // any pause ends its reply.
   if (damaged_ || skipping_ != 0) step.expect = 0;
   if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
   if (damaged_ || !request_.empty() || skipping_ != 0 || refusing_) {
@@ -115,7 +117,8 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// Checks the pause before each frame of a request. Bytes that arrive together do not show this pause.
+// Checks the pause that a host must keep before each further frame of a request. Nothing is checked if the frames were
+// delivered together, because the pause is then unknown.
 void Responder::check_frame_pause(Time at, Time before) {
   if (times_.frame == 0 || request_.empty() || request_.size() % times_.frame != 0 || at == before) return;
   expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);

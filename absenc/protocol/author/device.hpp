@@ -26,9 +26,9 @@ struct DeviceTimes {
   /// Pause that ends an incomplete request, or the reply of another encoder; 0: the duration of two bytes. It is longer
   /// than `frame_pause`.
   Time gap{};
-  std::uint8_t frame = 0;         ///< bytes of each frame of a request; 0: a request is one frame
+  std::uint8_t frame = 0;         ///< number of bytes of each frame of a request; 0: a request is one frame
   Time frame_pause{};             ///< shortest pause between two frames of a request
-  std::string_view frame_rule{};  ///< words of the rule that hosts keep `frame_pause`
+  std::string_view frame_rule{};  ///< text of the rule that hosts keep `frame_pause`
   /// Whether requests received during a transmission are stored and answered afterwards.
   bool keeps_requests = false;
 };
@@ -45,7 +45,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   void power_off(Time now) override;
 
  protected:
-  /// Constructs an encoder that replies with these times.
+  /// Constructs an encoder that keeps the times `times`, such as that from a request to its reply.
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
@@ -56,8 +56,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   /// Returns the earliest time at which the last received bytes, delivered at `at`, may have arrived.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
-  /// Returns the length of the request that begins with `begin`, or how many bytes are needed to know it; 0: none
-  /// begins so.
+  /// Returns the length of the request that begins with `begin`, or the number of bytes that are needed to know this
+  /// length; 0: no request begins with these bytes.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// Returns the length of the reply to `request`, which is for another encoder; 0: none.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
@@ -72,8 +72,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   };
   /// Sets that the present reply begins later by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
-  /// States that all encoders on the line answer the request in turn: this encoder `delay` later than it answers alone,
-  /// all of them within `all`. To be called from `respond`.
+  /// States that all encoders on the line answer the present request in turn: this encoder `delay` later than usual,
+  /// and all of them within the time `all`. To be called from `respond`.
   void take_turn(Time delay, Time all) {
     longer_ = delay;
     turns_ = all;
@@ -109,14 +109,15 @@ class Responder : public EncoderOn<std::uint8_t> {
   bool damaged_ = false;  // a character of the request was damaged: the rest is ignored until the line is silent
   Time received_at_{};
   Time late_{};               // the last bytes were delivered at most this long after they had arrived
-  std::size_t skipping_ = 0;  // characters left of another encoder's reply
+  std::size_t skipping_ = 0;  // number of characters still to be received of another encoder's reply
   bool skip_begins_ = false;  // the first character of another encoder's reply is still to be received
   bool refusing_ = false;     // a request was refused; `refuse` writes the reply when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
-  Time turns_end_{};          // bytes received before this time are replies of other encoders
+  Time turns_{};  // duration of the replies of all encoders to the present request; 0: only one answers
+  // bytes received before this time belong to replies of other encoders to a request for all
+  Time turns_end_{};
   ByteBuffer<64> stored_;     // bytes received during the present transmission, if DeviceTimes::keeps_requests is true
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
   // Number of consecutive transmissions, before the present one, during which a request was received.
@@ -141,9 +142,9 @@ class BusDevice : public Responder {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.

@@ -38,9 +38,9 @@ class HostOf : public Engine {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Returns the format of the encoder.
@@ -116,16 +116,16 @@ class ReadPosition : public HostOf<P> {
   Reading reading_{};
 };
 
-/// A conversation that a procedure (a coroutine) controls.
+/// A conversation that a procedure (a coroutine) controls, and that sends requests.
 template <class P>
-class DialogOf : public HostOf<P>, public Routine {
+class AskingDialog : public HostOf<P>, public Routine {
   static constexpr bool carries_position = requires { P::replies_carry_position; };
   struct Nothing {};
 
  public:
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// A request that a procedure can await. With `must`, the procedure ends if no valid reply comes.
@@ -133,7 +133,7 @@ class DialogOf : public HostOf<P>, public Routine {
   class [[nodiscard]] Question {
    public:
     /// Constructs the question for the request that `dialog` has prepared.
-    explicit Question(DialogOf& dialog) : dialog_(dialog) {}
+    explicit Question(AskingDialog& dialog) : dialog_(dialog) {}
     /// Sets that the request is sent only after `pause` since the last received or sent character.
     Question& after(Time pause) {
       dialog_.earliest_ = dialog_.received_at() + pause;
@@ -179,7 +179,7 @@ class DialogOf : public HostOf<P>, public Routine {
     }
 
    private:
-    DialogOf& dialog_;
+    AskingDialog& dialog_;
   };
 
   /// Returns an awaitable that sends `request` and gives the reply, or ends the procedure.
@@ -195,7 +195,7 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Returns an awaitable that waits until `pause` after the last received or sent character.
   [[nodiscard]] auto rest(Time pause) {
     struct Rest {
-      DialogOf& dialog;
+      AskingDialog& dialog;
       Time pause;
       [[nodiscard]] bool await_ready() const { return pause == Time{}; }
       void await_suspend(std::coroutine_handle<>) { dialog.sleep(dialog.received_at() + pause); }
@@ -209,6 +209,75 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Sets that the caller gets the present result (step `emit`).
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
+  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
+  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply; see
+  /// `only`.
+  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
+  [[nodiscard]] ChangeSent change_sent() const final { return change(); }
+  [[nodiscard]] Reading carried() const final {
+    if constexpr (carries_position) return carried_;
+    return {};
+  }
+  /// Declares whether the procedure, when asked to end early, restores the encoder first: it must check `is_aborted`.
+  void restores(bool yes = true) { restores_ = yes; }
+  /// Returns whether the caller has asked the procedure to end early; false if `restores` was not called before.
+  [[nodiscard]] bool is_aborted() const { return aborted_; }
+  bool abort() final {
+    aborted_ = aborted_ || restores_;
+    return restores_;
+  }
+
+ protected:
+  /// Constructs the conversation; the coroutine frames of its procedure are in `arena`.
+  AskingDialog(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
+  ~AskingDialog() = default;
+
+ private:
+  void prepare(const Request& request) {
+    next_ = request;
+    asking_ = P::manner(this->format(), request);
+    asking_.holds_line = asking_.holds_line || holds_line_;
+    earliest_ = {};
+    words_ = {};
+    changing_ = false;
+  }
+  void ask_it(bool must) {
+    must_ = must;
+    if (changing_) Routine::changes();
+    HostOf<P>::ask(next_, asking_, earliest_);
+  }
+  void concluded(Error error) final {
+    failure_ = error;
+    if constexpr (carries_position) carried_ = error == Error::none ? this->last_reading() : Reading{};
+    if (changing_ && error == Error::request_rejected) refused();
+    if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
+    resume();
+  }
+  void woken() override { resume(); }
+  void ended(const Outcome& outcome) final {
+    outcome_ = outcome;
+    this->finish(outcome.error, outcome.hold);
+  }
+
+  Request next_{};
+  Manner asking_{};
+  Time earliest_{};
+  std::string_view words_{};
+  Outcome outcome_{};
+  Error failure_ = Error::none;
+  [[no_unique_address]] std::conditional_t<carries_position, Reading, Nothing> carried_{};
+  bool must_ = false;
+  bool changing_ = false;  // whether the present request changes the encoder if it is executed
+  bool holds_line_ = false;
+  bool restores_ = false;
+  bool aborted_ = false;
+};
+
+/// A conversation that a procedure controls, and that sends requests or listens.
+template <class P>
+class DialogOf : public AskingDialog<P> {
+ public:
   /// Sets that this end of the line changes to `rate` bits per second, and the time limits to `times`.
   void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
@@ -235,77 +304,22 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Hear{*this};
   }
-  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
-  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply; see
-  /// `only`.
-  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
-  [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  [[nodiscard]] Reading carried() const final {
-    if constexpr (carries_position) return carried_;
-    return {};
-  }
-  /// Declares whether the procedure, when asked to end early, restores the encoder first: it must check `is_aborted`.
-  void restores(bool yes = true) { restores_ = yes; }
-  /// Returns whether the caller has asked the procedure to end early; false if `restores` was not called before.
-  [[nodiscard]] bool is_aborted() const { return aborted_; }
-  bool abort() final {
-    aborted_ = aborted_ || restores_;
-    return restores_;
-  }
 
  protected:
-  /// Constructs the conversation; the coroutine frames of its procedure are in `arena`.
-  DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
+  using AskingDialog<P>::AskingDialog;
   ~DialogOf() = default;
 
  private:
-  void prepare(const Request& request) {
-    next_ = request;
-    asking_ = P::manner(this->format(), request);
-    asking_.holds_line = asking_.holds_line || holds_line_;
-    earliest_ = {};
-    words_ = {};
-    changing_ = false;
-  }
-  void ask_it(bool must) {
-    must_ = must;
-    if (changing_) Routine::changes();
-    HostOf<P>::ask(next_, asking_, earliest_);
-  }
-  void concluded(Error error) final {
-    failure_ = error;
-    if constexpr (carries_position) carried_ = error == Error::none ? this->last_reading() : Reading{};
-    if (changing_ && error == Error::request_rejected) refused();
-    if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
-    resume();
-  }
   void woken() final {
     heard_ = {.over = true};
-    resume();
+    this->resume();
   }
   void heard(Bytes bytes) final {
     heard_ = {bytes, false};
-    resume();
-  }
-  void ended(const Outcome& outcome) final {
-    outcome_ = outcome;
-    this->finish(outcome.error, outcome.hold);
+    this->resume();
   }
 
-  Request next_{};
-  Manner asking_{};
-  Time earliest_{};
-  std::string_view words_{};
-  Outcome outcome_{};
-  Error failure_ = Error::none;
   Heard heard_{};
-  [[no_unique_address]] std::conditional_t<carries_position, Reading, Nothing> carried_{};
-  bool must_ = false;
-  bool changing_ = false;  // whether the present request changes the encoder if it is executed
-  bool holds_line_ = false;
-  bool restores_ = false;
-  bool aborted_ = false;
 };
 
 namespace detail {

@@ -71,7 +71,7 @@ class EncoderOn : public Device<Item> {
   /// Increments `answer_count`.
   void count_answer() { ++answer_count_; }
 
-  /// Is called after the start-up of the encoder has ended, with the time of that end.
+  /// Is called when the start-up of the encoder is over, with the time at which it ended.
   virtual void started(Time) {}
   /// Is called when an encoder that was ready is switched off, with the time of switching off.
   virtual void stopped(Time) {}

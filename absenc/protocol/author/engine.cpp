@@ -43,11 +43,11 @@ void Engine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
-  // The lambda saves a call that fills a plain variable with zeros first.
+  // The step is made by a lambda, because the compiler would first fill a plain variable with zeros.
   ByteStep step = [this]() -> ByteStep {
     return {.expect = due_, .at = never, .answer = manner_.answer_limit, .gap = times_.gap_limit};
   }();
-  // Between two characters there is little time, so the checks below are left out.
+  // In the middle of a reply this function returns early, because there is little time between two characters.
   if (state_ == State::receiving) return step;
   step.expect = 0;
   // The traffic before this conversation is unknown, so pauses are measured from now.
@@ -69,13 +69,14 @@ ByteStep Engine::next(Time now) {
   return step;
 }
 
-// Loops, because `woken` may begin a sleep that is already over.
+// Ends sleeps and listening times that are over. The loop is needed because `woken` may begin a sleep whose end has
+// already passed.
 void Engine::wake(Time now) {
   while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
     if (now < earliest_) return;
     if (state_ == State::listening) received_at_ = earliest_;
-    state_ = State::over;  // the conversation ends, unless `woken` continues it
+    state_ = State::over;  // the conversation ends, unless the virtual function `woken` continues it
     woken();
   }
 }
@@ -181,7 +182,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // On a disturbed or noisy line the received bytes may be more than the reply.
+  // On a disturbed or noisy line the received bytes may include others than those of the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }
@@ -191,7 +192,7 @@ void Engine::conclude_with(Error error) {
     --manner_.repeats;
     return start(received_at_ + manner_.pause);
   }
-  state_ = State::over;  // the conversation ends, unless `concluded` continues it
+  state_ = State::over;  // the conversation ends, unless the virtual function `concluded` continues it
   concluded(error);
 }
 

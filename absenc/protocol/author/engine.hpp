@@ -36,9 +36,9 @@ struct HostTimes {
 /// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
   unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
-  Time pause{};               ///< pause before a repetition; the pauses of HostTimes hold for it, too
+  Time pause{};               ///< pause before a request is repeated; the pauses of HostTimes are kept, too
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
-  /// Whether a reply is checked only after the silence that follows it.
+  /// Whether the host checks a reply only after the silence that follows the reply.
   bool ends_by_silence = false;
   /// Whether the content of the reply is not checked, and a missing reply is no error.
   bool any_reply = false;
@@ -67,7 +67,8 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] Error error() const final { return error_; }
   /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
   void report(FieldSink&) const override {}
-  /// Returns the last request, which is empty after `listen`, and the bytes of `reply`.
+  /// Returns the last request, which is empty after `listen`, and the bytes received since then, as `reply` returns
+  /// them.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Returns the time at which the last request was due to begin.
@@ -94,13 +95,13 @@ class Engine : public Conversation<std::uint8_t> {
   void emit() { emitting_ = true; }
   /// Sets that this end of the line is next switched to `rate` bits per second; 0: the rate stays.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
-  /// Replaces the time limits, for example after a change of the rate.
+  /// Replaces the host's time limits and pauses, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sets that nothing is sent until `time`, and that `woken` is then called.
   void sleep(Time time);
   /// Sets that the host listens for `duration` without sending; `heard` gets the received bytes.
   void listen(Time duration);
-  /// Continues to listen until the end of the time. To be called after `heard`.
+  /// Continues to listen until the duration given to `listen` is over. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
   /// Sets that the conversation ends with `error`, at the earliest `hold` after `received_at()`.
   void finish(Error error, Time hold = {});

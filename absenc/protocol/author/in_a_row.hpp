@@ -33,7 +33,8 @@ class RowCounter {
   /// Constructs a counter. `row` and `rules` must outlive it.
   RowCounter(const InARow& row, HostRules& rules) : row_(&row), rules_(&rules) {}
 
-  /// Counts a request of the command `code`, received from `earliest` to `at`. Returns whether to execute it now.
+  /// Counts a request of the command `code` that was delivered at `at` and may have arrived as early as `earliest`.
+  /// Returns whether the encoder executes the command now.
   [[nodiscard]] bool count(unsigned code, Time at, Time earliest) {
     if (code != code_) end();
     code_ = code;
@@ -51,14 +52,14 @@ class RowCounter {
     if (sent_ > 0 && sent_ < row_->requests) rules_->note(false, row_->number_rule);
     forget();
   }
-  /// Forgets the row, after a damaged request or at power off.
+  /// Forgets the requests counted so far, after a damaged request or at power off.
   void forget() { sent_ = counted_ = 0; }
 
  private:
   const InARow* row_;
   HostRules* rules_;
   unsigned code_ = 0;
-  unsigned sent_ = 0;  // number of requests in the present row
+  unsigned sent_ = 0;  // number of equal requests received in the present row
   // Number of requests that count for the next execution; a request that is sent too fast restarts this count at 1.
   unsigned counted_ = 0;
   Time since_{};

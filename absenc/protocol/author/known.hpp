@@ -8,12 +8,13 @@
 
 namespace absenc::author {
 
-/// Protocol P with constant `format` and `request`; its own Format and Request are empty.
+/// The protocol P for an encoder whose `format` and `request` are constants; the types Format and Request of this class
+/// are empty.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 struct Known {
   struct Format {};
   struct Request {};
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = typename P::Reply;
   static constexpr std::size_t longest_reply = P::longest_reply;  ///< Greatest length of a reply in bytes.
 

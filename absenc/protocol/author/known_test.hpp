@@ -11,7 +11,8 @@
 
 namespace absenc::author::testing {
 
-/// Runs `reader`, answers each request with `reply` in one piece or byte by byte, and returns the requests.
+/// Runs `reader` and answers each of its requests with `reply`, in one piece if `whole`, else byte by byte. Returns the
+/// bytes of the requests.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;

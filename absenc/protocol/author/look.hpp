@@ -9,14 +9,14 @@
 
 namespace absenc::author {
 
-/// Returns a reading of a position of `bits` bits, all valid, without turns.
+/// Returns a reading that has only a single-turn position of `bits` bits, all valid, and no turns.
 [[nodiscard]] constexpr Reading position_reading(std::uint64_t counts, unsigned bits) {
   Reading reading;
   reading.singleturn = counts & low_mask(bits);
   reading.singleturn_bits = reading.singleturn_valid_bits = bits;
   return reading;
 }
-/// Returns a reading of valid turns, without a position.
+/// Returns a reading that has only turns, all valid, and no position.
 [[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, Resolution resolution) {
   Reading reading;
   reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(resolution.multiturn_bits);
@@ -29,7 +29,7 @@ namespace absenc::author {
 /// The last exchange that `look` stored.
 template <class P>
 struct Looked {
-  typename P::Request request{};  ///< The request that was sent.
+  typename P::Request request{};  ///< The request for the position that was sent.
   typename P::Reply reply{};      ///< The valid reply to the request.
   Reading reading{};              ///< The reading of the reply, with the times of the exchange.
 };

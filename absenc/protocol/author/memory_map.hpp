@@ -31,8 +31,8 @@ template <class Counts>
   return bytes;
 }
 
-/// Returns the offset of a byte in a buffer of the areas for which `counts(area)` is true. Each area has one page, and
-/// one of these areas must include the byte.
+/// Returns the offset of a byte in a buffer that has the bytes of all areas for which `counts(area)` is true, one area
+/// after the other. Each area has one page, and one of these areas must include the byte.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t offset_of(std::span<const MemoryArea> areas, unsigned page, unsigned address,
                                               Counts counts) {

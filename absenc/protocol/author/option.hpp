@@ -18,7 +18,7 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
-// Returns the value of an option for a member of the format; a time gives nanoseconds.
+// Converts the value of a format's member to the value of its option; a duration becomes its number of nanoseconds.
 template <class Value>
 constexpr std::int64_t number_of(const Value& value) {
   if constexpr (requires { value.count(); }) {
@@ -27,7 +27,7 @@ constexpr std::int64_t number_of(const Value& value) {
     return static_cast<std::int64_t>(value);
   }
 }
-// Finds the type among `One` and `Others` that derives from all others.
+// Finds, among the types `One` and `Others`, the one that derives from all others.
 template <class One, class... Others>
 struct MostDerived {
   using Type = One;
@@ -42,7 +42,7 @@ template <auto member>
 struct OptionOf {
   /// Format of the encoder: the values of its options.
   using Format = decltype(detail::format_of(member));
-  /// Type of the format's member that the option sets.
+  /// C++ type of the format's member that the option sets.
   using Member = decltype(detail::member_of(member));
   Option info;  ///< Description of the option, without the member.
 

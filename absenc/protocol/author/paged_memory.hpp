@@ -18,11 +18,12 @@ struct PagedMemory {
   /// Address that selects pages: writing it selects a page, reading it returns the selected page.
   std::uint8_t select_address;
   std::uint8_t start_page;  ///< Page that is selected after power on.
-  Time page_time;           ///< How long the memory is busy after a page change.
-  Time write_time;          ///< How long the memory is busy after a write, except of an immediate byte.
+  Time page_time;           ///< Time for which the memory is busy after a page change.
+  Time write_time;          ///< Time for which the memory is busy after a write, except a write of an immediate byte.
   /// Shortest time from fetching a byte to reading it; 0: bytes are read without fetching.
   Time fetch_time{};
-  /// Whether a page change ends the busy time of a write, and a write that of a page change; false: both may run.
+  /// Whether a page change ends the busy time that a write began, and a write the busy time that a page change began;
+  /// false: both busy times may run at once.
   bool exclusive = true;
   /// Returns whether a byte is immediate: accessed without fetching, and during writes; null: no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
@@ -57,8 +58,8 @@ class PagedMemoryDevice : public Responder {
   /// Stores a byte in a writable area of the memory.
   virtual void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) = 0;
 
-  /// Executes a request received at `at`, unless the memory is busy. Returns the content of the reply; no value if
-  /// the memory is ready and `exists` is false. Busy times begin at `since`.
+  /// Executes a request that was received at `at`, unless the memory is busy. Returns the content of the reply; no
+  /// value if the memory is ready and `exists` is false. A busy time that the request causes begins at `since`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
   /// Returns whether the memory has the byte, or the page to be selected, and permits the access.
   [[nodiscard]] bool exists(const Access& request) const;
@@ -79,7 +80,7 @@ class PagedMemoryDevice : public Responder {
   bool page_changed_ = false;  // the host has not accessed the memory since the busy time of the last page change ended
   Time page_ready_at_{};
   Time written_at_{};  // end of the busy time of the last write; 0: none
-  // Address of the last request if it was a read during a write, for `refused_rule`.
+  // If the last request was a read during the busy time of a write: its address, needed to check `refused_rule`.
   std::optional<std::uint8_t> refused_address_{};
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;

@@ -23,9 +23,10 @@ namespace absenc::author {
 /// How a procedure ended: its error, with texts for people.
 struct Outcome {
   Error error = Error::none;  ///< Why the procedure failed; `Error::none`: it succeeded.
-  std::string_view detail{};  ///< the step that failed, and the evidence
-  std::string_view advice{};  ///< what to try, instead of the error's own advice
-  Time hold{};                ///< how long the encoder must not be disturbed after the last sent or received character
+  std::string_view detail{};  ///< text for people: the step of the procedure that failed, and the evidence
+  std::string_view advice{};  ///< text for people: what to try, instead of the error's own advice
+  /// time after the last sent or received character in which nothing may disturb the encoder
+  Time hold{};
   /// True: the explanation of the last reply is not added to `detail` and `advice`.
   bool alone = false;
 };
@@ -68,7 +69,7 @@ class Routine {
 
   /// Notes that requests from now on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
-  /// Notes that the encoder has not changed since `changes` was called.
+  /// Notes that the request after the call of `changes` has not changed the encoder.
   void refused() { change_ = ChangeSent::refused; }
   /// Returns what `changes` or `refused` noted last; `no` if neither was called.
   [[nodiscard]] ChangeSent change() const { return change_; }
@@ -90,10 +91,10 @@ class Routine {
   explicit Routine(std::span<std::byte> arena) : arena_(arena) {}
   ~Routine() = default;
 
-  /// Handles the end of the whole procedure, also if a part ended it.
+  /// Handles the end of the whole procedure, whether the procedure itself or one of its parts ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
-  /// Resumes the coroutine whose awaited result is available.
+  /// Resumes the coroutine that waits for a result which is now available.
   void resume() {
     next_ = current_;
     while (next_) {

@@ -13,9 +13,10 @@ namespace absenc::author {
 /// Result of `scan`: the addresses at which something answered, and clashes.
 template <std::size_t addresses>
 struct Nodes {
-  std::array<bool, addresses> there{};  ///< For each address: whether a valid reply, or two invalid ones, came.
-  /// Whether no answer was valid and at least one was damaged, for each address: two encoders share the address, or the
-  /// line is bad.
+  /// For each address: whether an encoder answered, with a valid reply or with two invalid ones.
+  std::array<bool, addresses> there{};
+  /// For each address: whether two requests got two invalid replies, and at least one of the replies was damaged. Two
+  /// encoders share this address, or the line is bad.
   std::array<bool, addresses> clash{};
 };
 
@@ -54,7 +55,7 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
       continue;
     }
     nodes.there[i] = any = true;
-    // Two complete but invalid answers come from one encoder, so they are no clash.
+    // One encoder alone sends two complete but invalid replies, so they are no sign of two encoders at one address.
     nodes.clash[i] = !first && !second && (is_damage(first.error()) || is_damage(second.error()));
     if (++noise == most_in_a_row) {
       co_return {Error::wrong_length, "something comes back whatever address is asked: noise, or another device"};

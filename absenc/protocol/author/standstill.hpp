@@ -11,7 +11,7 @@
 
 namespace absenc::author {
 
-/// Time between two readings that show whether the shaft stands still.
+/// Time between the two readings by which a host decides whether the shaft stands still.
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;

@@ -86,7 +86,7 @@ struct Tables {
 
   /// Returns the parsed content of a vector's text.
   static constexpr VectorParts parts_of(const VectorText& text) {
-    return VectorParts(text, Clocked<P> || declared.frames_are_texts);
+    return VectorParts(text, Clocked<P> || Bitwise<P> || declared.frames_are_texts);
   }
   /// Bytes and expected fields of all vectors, one after the other.
   static constexpr auto vector_parts = [] {

@@ -41,7 +41,8 @@ void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // npos if there is no equals sign; the check below then returns false
+    // without an equals sign `equals` is npos, and the check below then returns false
+    const std::size_t equals = text.find('=');
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "absenc/core/hex.hpp"
+#include "absenc/protocol/author/bit_host.hpp"
 #include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/declaration.hpp"
@@ -32,7 +33,7 @@ struct Descriptor {
   using P = typename Declared::Protocol;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = typename P::Request;
   /// Tables of commands, models and vectors of the declaration.
   using Made = Tables<declared>;
@@ -47,8 +48,11 @@ struct Descriptor {
 
   /// Whether replies to most requests have the position.
   static constexpr bool carries_position = requires { P::replies_carry_position; };
-  /// Whether the protocol has requests that its functions decode.
+  /// Whether hosts send requests that functions of P decode. False on clocked lines, and if the declaration has a
+  /// `decode` of its own.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
+  /// Whether frames are bits.
+  static constexpr bool has_bits = Clocked<P> || Bitwise<P>;
 
   // ---- Functions of the descriptor
 
@@ -67,7 +71,7 @@ struct Descriptor {
     } else if constexpr (Clocked<P>) {
       return decode_bits(f, to_bits(frame), sink);
     } else {
-      return decode_bytes(f, asked, frame, sink);
+      return decode_exchange(f, asked, frame, sink);
     }
   }
 
@@ -108,15 +112,24 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Checks an exchange of bytes, and puts its fields into `sink`.
-  static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
-    const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
+  /// Returns what the protocol's functions take of a frame: its bytes, or its bits.
+  static constexpr auto content(const Frame& frame) {
+    if constexpr (Bitwise<P>) {
+      return to_bits(frame);
+    } else {
+      return frame.bytes;
+    }
+  }
+
+  /// Checks an exchange with a request and its reply, and puts its fields into `sink`.
+  static constexpr Error decode_exchange(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
+    const Result<Request> request = request_of(f, asked, frame);
     if (!request) return request.error();
     if (frame.bytes.empty()) {
       declared.report.put_request(sink, f, *request);
       return Error::none;
     }
-    const auto reply = P::decode(f, *request, frame.bytes);
+    const auto reply = P::decode(f, *request, content(frame));
     if (!reply) return reply.error();
     declared.report.put_reply(sink, f, *request, *reply);
     const Reading reading = P::reading(f, *request, *reply);
@@ -125,15 +138,15 @@ struct Descriptor {
   }
 
   /// Returns the request of an exchange, or the one that a reply captured without it is taken to answer, or an error.
-  static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
+  static constexpr Result<Request> request_of(const Format& f, Frame asked, Frame reply) {
     static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
-    if (asked.empty()) {
-      if (reply.empty()) return Error::wrong_length;
-      return declared.guess_request(f, reply);
+    if (asked.bytes.empty()) {
+      if (reply.bytes.empty()) return Error::wrong_length;
+      return declared.guess_request(f, content(reply));
     }
-    const Result<Request> request = P::decode_request(f, asked);
+    const Result<Request> request = P::decode_request(f, content(asked));
     if constexpr (declared.answer_to_bad != nullptr) {
-      if (!request) return declared.answer_to_bad(f, asked, request.error(), reply);
+      if (!request) return declared.answer_to_bad(f, asked.bytes, request.error(), reply.bytes);
     }
     return request;
   }
@@ -167,11 +180,28 @@ struct Descriptor {
     if (one.request == nullptr) return Error::unsupported;
     const Result<Request> request = one.request(f, arguments);
     if (!request) return request.error();
-    const auto bytes = P::encode(f, *request);
-    if (bytes.empty()) return asks_by_pulse<P>(f, *request) ? Error::unsupported : Error::invalid_argument;
+    if constexpr (Bitwise<P>) return bits_as_text(P::encode(f, *request), out);
+    else return bytes_of(f, *request, out);
+  }
+  /// Writes the bytes of a request into `out` and returns their number.
+  static Result<std::size_t> bytes_of(const Format& f, const Request& request, MutableBytes out) {
+    const auto bytes = P::encode(f, request);
+    if (bytes.empty()) return asks_by_pulse<P>(f, request) ? Error::unsupported : Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
+  }
+
+  /// Writes the bits of a request, with its supplement, into `out` as text of 0 and 1 and returns their number.
+  static Result<std::size_t> bits_as_text(const BitRequest& request, MutableBytes out) {
+    const std::size_t size = request.bits.size() + request.supplement.size();
+    if (size == 0) return Error::invalid_argument;
+    if (size > out.size()) return Error::buffer_too_small;
+    std::size_t written = 0;
+    for (const BitView& bits : {request.bits.view(), request.supplement.view()}) {
+      for (std::size_t i = 0; i < bits.size; ++i) out[written++] = static_cast<std::uint8_t>(bits[i] ? '1' : '0');
+    }
+    return written;
   }
 
   /// Returns the length in bytes of the request that begins with `begin`, as P::request_size.
@@ -192,7 +222,7 @@ struct Descriptor {
   static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (declared.frame_end != nullptr) {
       return declared.frame_end(values, direction, bytes);
-    } else if constexpr (Clocked<P>) {
+    } else if constexpr (has_bits) {
       // Each capture of a clocked link is one frame, because a pause of the clock ends it.
       return {FrameEnd::Kind::complete, bytes.size()};
     } else {
@@ -243,7 +273,7 @@ struct Descriptor {
   /// Returns false if Protocol::manner states that the request has no reply, or that any reply is accepted; else true.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
-    const Result<Request> request = P::decode_request(f, asked.bytes);
+    const Result<Request> request = P::decode_request(f, content(asked));
     if (!request) return true;
     const Manner manner = P::manner(f, *request);
     return manner.expects_reply && !manner.any_reply;
@@ -251,7 +281,7 @@ struct Descriptor {
   /// Returns Manner::pause of a request; 0 for an invalid one.
   static Time pause(const Options& values, Frame asked) {
     const Format f = declared.format(values);
-    const Result<Request> request = P::decode_request(f, asked.bytes);
+    const Result<Request> request = P::decode_request(f, content(asked));
     return request ? P::manner(f, *request).pause : Time{};
   }
 
@@ -276,7 +306,7 @@ struct Descriptor {
       const CanFrame reply = can_frame_of_text(vector.reply);
       return decode(values, {.can = vector.request.empty() ? nullptr : &request},
                     {.can = vector.reply.empty() ? nullptr : &reply}, sink);
-    } else if constexpr (Clocked<P>) {
+    } else if constexpr (has_bits) {
       const auto request = bits_of_text(vector.request);
       const auto bits = bits_of_text(vector.reply);
       return decode(values, {.bytes = request.bytes(), .bits = request.size()},
@@ -386,6 +416,7 @@ struct Descriptor {
               .services_carry_position = carries_position,
               .conditions = declared.conditions,
               .control_bit = declared.control_bit,
+              .host_bits = declared.host_bits,
               .remembered = declared.remembered,
               .follower = declared.follower,
               .follower_storage = declared.follower_storage};

@@ -25,7 +25,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// Result and fields of a command. `numbers` has real numbers, too, truncated to integers.
+/// Result and fields of a command. `numbers` has also the fields with fractions, truncated to integers.
 struct RunResult : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
@@ -88,7 +88,7 @@ struct BrokenRules final : RuleWatch {
   std::vector<std::string> rules;
 };
 
-/// A conversation for a command, with its storage; arguments left out have their defaults.
+/// A conversation for a command, with its storage; arguments that the test leaves out have their defaults.
 template <class Item>
 class Talk {
  public:
@@ -161,7 +161,8 @@ struct HostedLine : sim::Line<std::uint8_t> {
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);
-    run_until(now());  // executes the device's `sent` event, which has the same time as the end of the conversation
+    // lets the device handle its `sent` event, which has the same time as the end of the conversation
+    run_until(now());
     replace(*node, idle);
     return ended;
   }

@@ -53,7 +53,7 @@ struct ChainFormat {
   return bits;
 }
 
-/// Returns the number of clocks by which the other slaves delay the start bit.
+/// Returns the number of clocks by which the other slaves of the chain delay the start bit.
 [[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
 /// A decoded frame of several encoders in a chain.
@@ -77,7 +77,7 @@ struct ChainReply {
   return error == Error::none ? Result(reply) : error;
 }
 
-/// Appends the frame of `reply` to `out`, without the words of the slaves in the mask `silent` (bit n is slave n).
+/// Appends the frame of `reply` to `out`, but not the words of the slaves in the mask `silent` (bit n is slave n).
 /// Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,

@@ -19,7 +19,7 @@ using namespace author;
 
 constexpr unsigned most = ChainFormat::most;
 
-// Options of the word in one channel of the chain.
+// Options that describe the position word in one channel of the chain.
 template <unsigned>
 struct ChannelSettings {
   std::uint8_t singleturn_bits = 19;

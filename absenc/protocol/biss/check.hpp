@@ -23,11 +23,12 @@ struct Check {
 
   /// Returns the number of bits after the word: life counter and CRC.
   [[nodiscard]] constexpr unsigned bits() const { return width + (life_counter ? life_counter_bits : 0); }
-  /// Returns whether all members are equal.
+  /// Returns whether two checks have the same CRC parameters and the same life counter setting.
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
-/// Returns whether the polynomial ends in 1: an even one makes a weaker CRC. True without a CRC.
+/// Returns whether the polynomial ends in the term 1 or there is no CRC; a polynomial without this term makes a weaker
+/// CRC.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
 inline constexpr Check crc6{};  ///< Check of most encoders: a CRC of 6 bits.

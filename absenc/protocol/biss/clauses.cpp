@@ -7,7 +7,7 @@
 namespace absenc::biss {
 namespace {
 
-/// Errors of the bits before the data: idle bits, ACK, start bit and CDS.
+/// Errors that decoding reports for wrong bits before the data: idle bits, ACK, start bit and CDS.
 constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
 /// Requirements of the document on the registers of an encoder.

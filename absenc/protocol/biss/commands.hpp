@@ -14,7 +14,7 @@ namespace absenc::biss {
 
 /// Argument: address of a register.
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
-/// Argument: bank that addresses 0 to 63 belong to.
+/// Argument: bank in which the addresses 0 to 63 are accessed.
 inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
 /// Arguments of `memory-read`.
 inline constexpr std::array<Argument, 3> read_arguments{
@@ -33,11 +33,11 @@ inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addres
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, without acknowledgement", 0, 255}, {"command", "its number", 0, 3}}};
 
-/// A register that a command of its own reads by name.
+/// A register that has a command of its own, which reads it by name.
 struct NamedRegister {
   std::string_view name;     ///< Name of the register.
   unsigned address;          ///< Address of the register.
-  std::string_view meaning;  ///< Content of the register, in words.
+  std::string_view meaning;  ///< Meaning of the register's content, as words for people.
 };
 /// All registers that can be read by name.
 inline constexpr std::array<NamedRegister, 6> named_registers{{
@@ -55,7 +55,7 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-/// Option of all BiSS units: the clock.
+/// Option of all BiSS units: rate of the clock MA in kHz.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
 /// Values of the two options from which the BiSS timeout is made.
@@ -63,7 +63,7 @@ struct TimeoutSettings {
   std::uint16_t timeout_tenths = 0;  ///< Fixed BiSS timeout in 0.1 us; 0: unknown.
   bool adaptive_timeout = false;     ///< Whether the encoder adapts its timeout to the clock.
 
-  /// Returns the BiSS timeout that the two options select.
+  /// Returns the BiSS timeout that the options `timeout_tenths` and `adaptive_timeout` give.
   [[nodiscard]] constexpr Timeout timeout_given() const {
     if (adaptive_timeout) return Timeout::adaptive();
     return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));
@@ -228,7 +228,7 @@ Result<std::size_t> encode_control(const F& format, const Command& command, Argu
 /// Returns the line settings of BiSS, which are the same for all formats.
 template <class F>
 constexpr LineSettings line_of(const F&) {
-  return line_settings;  // the conversation sets the clock rate itself
+  return line_settings;  // these settings have no rate of a format, because the conversation sets the clock rate itself
 }
 
 /// Decodes a control frame into `sink`: `asked` has its CDM bits, `answered` its CDS bits.

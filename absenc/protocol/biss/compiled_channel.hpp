@@ -38,7 +38,7 @@ class CompiledChannel {
   /// Returns whether the word has a CRC.
   [[nodiscard]] constexpr bool has_crc() const { return width_ != 0; }
 
-  /// The bits of a word with its check.
+  /// The bits of a received word, split into the part that the CRC covers and the CRC.
   struct Bits {
     std::uint64_t covered = 0;  ///< Word and life counter.
     std::uint16_t crc = 0;      ///< CRC as the encoder sent it; 0 if the format has none.

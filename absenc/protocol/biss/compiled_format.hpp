@@ -7,7 +7,7 @@
 
 namespace absenc::biss {
 
-/// A format with its word and check compiled, for many frames.
+/// A BiSS format whose word and check are compiled, so that many frames are decoded fast.
 class CompiledFormat {
  public:
   /// Compiles `format`, which is copied.
@@ -15,7 +15,7 @@ class CompiledFormat {
   /// Returns the format that was compiled.
   constexpr operator const Format&() const { return format_; }
 
-  /// Decodes a frame with the same result as biss::decode by the format.
+  /// Decodes a frame with the same result as biss::decode with the format that was compiled.
   [[nodiscard]] constexpr Result<Reply> decode(const BitView& samples, Cds cds) const {
     if (!channel_.is_possible()) return decode_otherwise(samples, cds);
     return detail::decode_compiled<Word>(channel_, samples, cds, [&] { return decode_otherwise(samples, cds); });
@@ -49,7 +49,7 @@ class CompiledSafetyFormat {
   /// Returns the format that was compiled.
   constexpr operator const SafetyFormat&() const { return format_; }
 
-  /// Decodes a frame with the same result as biss::decode by the format.
+  /// Decodes a frame with the same result as biss::decode with the format that was compiled.
   [[nodiscard]] constexpr Result<SafetyReply> decode(const BitView& samples, Cds cds) const {
     detail::Head head;
     if (!is_possible_ || !detail::find_data(samples, cpw_.bits() + spw_.bits(), cds, head)) {

@@ -83,7 +83,7 @@ bool ControlMaster::step(bool cds) {
 bool ControlMaster::header(bool cds) {
   if (at_ == 0) {
     if (zeros_ < control_pause) return false;
-    if (cds) return end(Error::bad_framing);  // CDS is 1 although no request was sent
+    if (cds) return end(Error::bad_framing);  // this CDS bit is 1 although the host has sent no request
     at_ = 1;
     return true;
   }
@@ -111,7 +111,7 @@ bool ControlMaster::direction(bool cds) {
         state_ = State::start;
         return true;
       }
-      // The lock bits show whether a slave with this ID exists; if so, it refused the access.
+      // The lock bits show whether a slave with the ID of the request exists. If one exists, it refused the access.
       return end(frame_.request.slave < frame_.slaves ? Error::request_rejected : Error::timeout);
   }
 }
@@ -286,7 +286,7 @@ bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   return begin_byte(target);
 }
 
-// A byte with a wrong CRC is not stored.
+// The encoder does not store a written byte whose CRC is wrong.
 bool ControlSlaves::write(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) {

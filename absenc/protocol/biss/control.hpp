@@ -40,7 +40,7 @@ struct ControlRequest {
 
   /// Returns whether the request is a command.
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
-  /// Returns whether all members are equal.
+  /// Returns whether two requests are equal in all members.
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
 };
 
@@ -140,7 +140,7 @@ class ControlMaster {
   std::uint16_t in_ = 0;  // Bits of the present data byte and its CRC that were received so far.
   std::uint16_t out_ = 0;
   std::size_t count_ = 0;  // Number of data bytes to transfer in this control frame.
-  // Number of frames since the start bit of the control frame, or of the data byte.
+  // Number of frames since the start bit of the control frame or, while a data byte is transferred, of this byte.
   unsigned at_ = 0;
   unsigned zeros_ = 0;
   unsigned delay_ = 0;

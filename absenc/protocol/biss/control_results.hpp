@@ -39,7 +39,7 @@ class NumberList {
 /// digits.
 class MakerName {
  public:
-  /// Appends these bytes of the manufacturer registers.
+  /// Appends `bytes`, which are values of the manufacturer registers.
   constexpr void append(Bytes bytes) {
     constexpr std::string_view hex = "0123456789ABCDEF";
     for (const std::uint8_t byte : bytes) {
@@ -69,19 +69,20 @@ struct ControlResults {
   std::optional<std::uint8_t> slave_id{};
   std::optional<std::uint8_t> bank{};     ///< Bank that was accessed or is selected; 0 for registers outside banks.
   std::optional<std::uint8_t> address{};  ///< Address of the first register that was accessed, 0 to 127.
-  std::optional<std::uint8_t> value{};    ///< Value of the only or first register that was accessed.
+  std::optional<std::uint8_t> value{};    ///< Value of the accessed register; if several were accessed, of the first.
   ByteBuffer<control_most> bytes;         ///< Values of successive registers.
-  bool has_data = false;                  ///< Whether `bytes` is reported.
+  bool has_data = false;                  ///< Whether the results include `bytes`, the values of successive registers.
   /// Numbers of frames by which the encoder delayed each byte; empty if they are not known.
   NumberList start_delay;
-  std::optional<bool> next_address_accepted{};  ///< Whether the register after the last one may be accessed (P = 0).
-  std::optional<std::uint8_t> command{};        ///< Number of the command, 0 to 3.
-  std::optional<bool> broadcast{};              ///< Whether the command is for all slaves, without acknowledgement.
-  NumberList slave_ids;                         ///< IDs of the slaves to which a command is addressed.
-  NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
-  std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
+  /// Whether the encoder permits access to the register that follows the last accessed one (P = 0).
+  std::optional<bool> next_address_accepted{};
+  std::optional<std::uint8_t> command{};  ///< Number of the command, 0 to 3.
+  std::optional<bool> broadcast{};        ///< Whether the command is for all slaves, without acknowledgement.
+  NumberList slave_ids;                   ///< IDs of the slaves to which a command is addressed.
+  NumberList acknowledged;                ///< IDs of the slaves that acknowledged a command.
+  std::optional<bool> executed{};         ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
-  /// Whether the register was written; false: it had this value already.
+  /// Whether the register was written; false: the register already had the value to be written.
   std::optional<bool> written{};
   /// True: the encoder refused to read the register; otherwise no value.
   std::optional<bool> missing{};
@@ -90,7 +91,8 @@ struct ControlResults {
   std::optional<std::uint64_t> serial_number{};  ///< Serial number of the encoder.
   ByteBuffer<6> device_id;                       ///< Device ID of the encoder, six bytes; empty if it was not read.
   MakerName manufacturer;                        ///< Manufacturer's two characters; empty if they were not read.
-  Reading reading{};                             ///< Stays empty, because these procedures do not report a position.
+  /// Position of the encoder; stays empty, because these procedures do not report one.
+  Reading reading{};
 };
 
 namespace shown {

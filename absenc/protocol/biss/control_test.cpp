@@ -48,7 +48,8 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares CDM with the bits of the document up to their last 1; then at least 14 zeros, and no 1, must follow.
+// Compares the CDM bits that are sent with those drawn in the document, up to the last 1 drawn there. After it at least
+// 14 zeros and no 1 must follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -88,7 +89,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Flips one bit of CDS at a time, from the answer to the bit R (read) to the CRC of the byte.
+  // Flips one bit of CDS at a time, each from the encoder's answer to the bit R (read) to the CRC of the data byte.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -340,9 +341,10 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   EXPECT_EQ(error(read.cdm, begin(read.cds, 5)), Error::truncated);
   EXPECT_EQ(error(read.cdm, begin(read.cds, 18)), Error::truncated);
   EXPECT_EQ(error(begin(read.cdm, 20), read.cds), Error::truncated);
-  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // the host sends no start bit S
-  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // start bit S of the encoder is late
-  EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
+  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);  // the host sends no start bit S
+  // the encoder sends its start bit S late, by 13 frames
+  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);
+  EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros of CDM end the control frame
   // The encoder refuses the next register by P = 1, but the host requests it.
   EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);
   // a delay is not allowed for the first written byte
@@ -365,7 +367,8 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   };
   EXPECT_EQ(answered(written(0x5A), write.cds), Error::none);
   EXPECT_EQ(answered(written(0xA5), write.cds), Error::unexpected_reply);
-  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // CDS is 1 before any request
+  // the first CDS bit is 1, before the host has sent a request
+  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);
 }
 
 TEST(BissControl, SlaveDoesNotStoreByteWithWrongCrc) {

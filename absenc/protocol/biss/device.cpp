@@ -15,7 +15,7 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
   const BitBuffer driven = samples;
   samples.clear();
   const auto bit = [&driven](std::size_t index, unsigned by) {
-    if (index < by) return true;  // before the delay is over, the line is still idle
+    if (index < by) return true;  // before the delay of the line has passed, the host samples an idle line
     return index - by < driven.size() && driven.view()[index - by];
   };
   for (std::size_t i = 0; i < driven.size() + late && i < Samples::capacity(); ++i) {
@@ -43,7 +43,7 @@ VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit
   const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
-    own[registers::eds_bank - registers::bank_size] = 0;  // the virtual encoder has no electronic data sheet
+    own[registers::eds_bank - registers::bank_size] = 0;  // value 0: the virtual encoder has no electronic data sheet
     own[registers::profile - registers::bank_size] = 0;
     own[registers::profile + 1 - registers::bank_size] = 0;
     own[lowest - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);

@@ -18,7 +18,8 @@ struct Behaviour {
   Time line_delay{};
   /// A sample that is taken less than this time from a delayed edge may read the old or the new bit.
   Time edge_noise = 20ns;
-  Time register_delay{};        ///< Time from the request for a register until it is ready.
+  /// Time from the host's request for a register until the virtual encoder can send or take the register's value.
+  Time register_delay{};
   bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
 
@@ -28,14 +29,14 @@ using Samples = author::DrivenBits;
 /// Delays the samples of SLO as the line between encoder and host does.
 class LineDelay {
  public:
-  /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
+  /// Delays `samples` by `behaviour.line_delay`; `period` is the period of MA at which they were taken.
   void apply(const Behaviour& behaviour, Time period, Samples& samples);
 
  private:
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder apart from its port: makes the samples of SLO.
+/// A virtual encoder without its line: makes the samples of SLO.
 template <class F>
 class EncoderOf {
  public:
@@ -55,14 +56,15 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // a frame that does not fit is sent without a start bit
+    // an encoded frame for which `samples` has no room is sent without a start bit
+    if (!encode(format_, reply, samples, data_off_)) {
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
     const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
-    // Zeros at the end take the place of words that are switched off.
+    // Zeros at the end of the frame take the place of position words that are switched off.
     while (samples.size() < whole) samples.append(0, 1);
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
@@ -220,7 +222,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   EncoderOf<F> encoder_;
   ControlSlaves slaves_;
   VirtualRegisters registers_;
-  unsigned needed_ = 0;  // clocks that the present frame needs; 0: no frame was sent
+  unsigned needed_ = 0;  // number of clocks that the present frame needs; 0: the host has not clocked a frame
   Time timeout_{};       // BiSS timeout after the present frame
   Time period_{};
   Time free_at_{};  // earliest time of the next frame: the BiSS timeout after the last rising edge

@@ -57,12 +57,12 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
-  // Two violations: the clock before the timeout, and the frame of only 16 clocks after it.
+  // The host broke two rules: it clocked before the timeout had passed, and then read a frame with only 16 clocks.
   EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 
 TEST(BissDevice, UsesTimeoutOfFormat) {
-  // `pause` begins at the end of the last clock period, half a period after the last rising edge.
+  // `pause` begins at the end of the last clock period of the first frame, half a period after its last rising edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
     format.timeout = timeout;
@@ -113,9 +113,11 @@ unsigned good_frames(Time line_delay, Time period) {
 TEST(BissDevice, LineDelayCorruptsFramesAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
-  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // each sample is taken at an edge, so it reads the old bit or the new bit
+  // each sample is taken when the delayed line just changes, so it reads the old bit or the new bit
+  EXPECT_LT(good_frames(300ns, 315ns), 20u);
   EXPECT_LT(good_frames(300ns, 290ns), 20u);
-  EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // the line is a whole bit late, so SLO goes low one sample late
+  // the line delays the bits by a whole clock, so SLO seems to go low one sample late
+  EXPECT_EQ(good_frames(300ns, 227ns), 0u);
 }
 
 TEST(BissDevice, LineDelayOfAWholeBitAddsAnIdleSample) {

@@ -14,7 +14,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
 
  public:
-  /// Type of a decoded position frame.
+  /// C++ type of a decoded position frame.
   using Reply = typename ProtocolOf<F>::Reply;
 
   /// Returns an awaitable that clocks the next frame: `co_await dialog.frame()`.

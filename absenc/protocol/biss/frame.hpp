@@ -54,12 +54,12 @@ class Timeout {
     if (code_ == is_adaptive) return Time(one_and_a_half(period));
     return Time((code_ != 0 ? code_ : 40u) * 500u);
   }
-  /// Returns whether all members are equal.
+  /// Returns whether two timeouts are equal.
   friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
 
  private:
   static constexpr std::uint8_t is_adaptive = 1;
-  // 32 bits suffice: with the lowest `ma_khz` a period is 100 us.
+  // 32 bits are enough for one and a half periods, because the longest period of MA, at the lowest `ma_khz`, is 100 us.
   static constexpr std::uint32_t one_and_a_half(Time period) {
     const auto clock = static_cast<std::uint32_t>(period.count());
     return clock + clock / 2;
@@ -119,7 +119,8 @@ struct Format {
 /// Returns the number of bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// Returns the number of ACK bits, at least 1. Both arguments are at most a second.
+/// Returns the number of ACK bits, at least 1, that an encoder sends which needs the time `latency` for its position,
+/// at the clock period `period`. Both times are at most a second.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());
@@ -181,7 +182,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Decodes the bits before the data, and checks that `size` bits follow.
+// Decodes idle bits, ACK, start bit and CDS, which precede the data, and checks that `size` bits of data follow.
 template <class ReplyType>
 constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -221,7 +222,7 @@ constexpr auto decode_by(const Source& source, const BitView& samples, Cds cds) 
   return result;
 }
 
-// The samples before the data of a frame without errors.
+// The numbers of samples before the data of a frame that has no error.
 struct Head {
   unsigned idle = 0;      // number of samples before the ACK
   unsigned ack_bits = 0;  // number of zeros between the idle samples and the start bit
@@ -308,7 +309,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// Decodes a frame whose format is known at compile time; the errors are those of a format known at run time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
-  // Processors without registers of 64 bits get only one decoder, to save memory.
+  // For processors without registers of 64 bits only one of the two decoders is compiled, to save memory.
   if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
     return detail::decode_compiled<typename Known<format>::Word>(
         detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });

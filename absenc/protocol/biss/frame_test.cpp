@@ -87,7 +87,8 @@ void agree(std::uint64_t seed) {
     std::copy(samples.bytes().begin(), samples.bytes().end(), copy.begin());
     if (random.chance(0.3)) copy[random.below(8)] ^= static_cast<std::uint8_t>(1u << random.below(8));
     const std::size_t size = random.chance(0.2) ? random.below(samples.size() + 1) : samples.size();
-    const BitView view{Bytes(copy).first((size + 7) / 8), size};  // the view has no bytes beyond the samples
+    // the view ends with the last sample, so a read behind it is found
+    const BitView view{Bytes(copy).first((size + 7) / 8), size};
     const auto known = decode<format>(view);
     const Result<Reply> given = decode(format, view);
     ASSERT_EQ(known.error(), given.error());
@@ -116,11 +117,11 @@ void agree(std::uint64_t seed) {
 
 constexpr Format plain{};
 constexpr Format turns{.word = "multiturn:16 position:32 error:1! warning:1!"_word};
-// This word is longer than 64 bits.
+// The word of this format is longer than 64 bits.
 constexpr Format behind{.word = "position:13 multiturn:51 warning:1 gray parity:1!"_word};
 constexpr Format values{.word = "position:20 temperature=value:8 error:1 skip:3 warning:1!"_word};
 constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
-// Formats with other CRCs, and with a long word.
+// Formats whose CRC is not the usual one of 6 bits, and a format with a long word.
 constexpr Format other_crc{.word = "position:24 error:1! warning:1!"_word, .check = {8, 0x97}};
 constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check = {16, 0x90D9, 0x1234, false, false}};
 constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};

@@ -31,9 +31,9 @@ template <class F>
 struct ProtocolOf {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = F;
-  /// Empty type: on a clocked link the host sends no requests.
+  /// C++ type of requests, which is empty: on a clocked link the host sends no requests.
   using Request = author::NoRequest;
-  /// Type of a decoded frame.
+  /// C++ type of a decoded frame.
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
   /// Interface by which procedures clock frames.
   using Dialog = ControlDialog<F>;
@@ -106,7 +106,7 @@ template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  // greatest number of times that a late or cut frame is read again
+  // greatest number of times that the host reads again after a frame that was late or cut off
   static constexpr unsigned most_late = 4;
 
  public:
@@ -122,7 +122,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     const Error error = this->take(samples);
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
-      // A line that stays idle may have a longer delay than expected.
+      // If SLO stays idle in all samples, the delay of encoder and line may be longer than expected.
       if (error == Error::line_stuck && samples[0] && !second_ && !tried_longest_delay_) {
         tried_longest_delay_ = true;
         return this->clock(P::all_clocks(this->format()));

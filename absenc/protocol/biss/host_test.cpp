@@ -247,7 +247,7 @@ TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  // The last transfer is for the longest delay of the line.
+  // The host's last transfer has enough clocks for the longest delay of the line that it searches.
   const std::size_t longest = ProtocolOf<Format>::all_clocks(format);
   EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));
 }

@@ -63,7 +63,8 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Returns whether a data byte was late: delayed by the encoder, or its start bit was lost.
+/// Returns whether a data byte of the control frame arrived late, because the encoder delayed it or because its start
+/// bit was lost.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
@@ -93,7 +94,7 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
     if (!stopped) co_return Error::none;
     first += static_cast<unsigned>(data.size());
     count -= data.size();
-    attempts = control_attempts + 1;  // the remaining registers get all attempts again
+    attempts = control_attempts + 1;  // for the remaining registers the attempts are counted anew
     before = {};
   }
   co_return error;

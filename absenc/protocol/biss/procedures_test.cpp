@@ -19,9 +19,11 @@ TEST(BissProcedures, RefusesImpossibleRegistersWithoutRequest) {
   ProcedureBench one;
   const auto refused = [&one](const ControlResults&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
   const Error no = Error::invalid_argument;
-  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // the last register is beyond the end of the bank
-  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // the registers end before the requested count
-  refused(one.ask<read_memory<Format>>({64, 1, 1}, no));   // registers outside the banks are on bank 0
+  // the last of the requested registers is beyond the end of the bank
+  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));
+  // from this address on the encoder has fewer registers than are requested
+  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));
+  refused(one.ask<read_memory<Format>>({64, 1, 1}, no));  // registers outside the banks are on bank 0
   refused(one.ask<write_memory<Format>>({72, 1, 7, 1}, no));
   refused(one.ask<write_memory<Format>>({72, 7, 1, 1}, no));
   refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // the serial number is read only
@@ -196,7 +198,7 @@ TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // The first late frame had too few clocks, so the second and third are compared.
+  // The first late frame had too few clocks, so the host compares the delays of the second and third frame.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

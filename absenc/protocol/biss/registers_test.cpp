@@ -40,7 +40,7 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
   return text == nullptr ? usual : static_cast<std::uint32_t>(std::atoll(text));
 }
 
-// number of frames for the next host; global, because a procedure starts in a constructor
+// Number of frames after which the next host ends; a global variable, because a procedure starts in a constructor.
 std::uint32_t limit = 0;
 
 /// Counters of a host's register accesses, and the register values that the host relies on.
@@ -49,7 +49,7 @@ struct HostRecord {
   std::uint32_t reads = 0;
   std::uint32_t writes = 0;
   std::uint32_t failures = 0;
-  std::uint32_t wrong = 0;  // number of accepted bytes with a wrong value
+  std::uint32_t wrong = 0;  // number of register values that the host read without an error although they were wrong
   std::array<bool, registers::bank_size> read{};
   std::array<bool, registers::bank_size> written{};
   std::array<std::uint8_t, registers::bank_size> known{};
@@ -80,7 +80,8 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, HostRecord& record) {
       const Error written = co_await write_register(dialog, master, address, value);
       ++record.writes;
       if (written != Error::none) ++record.failures;
-      is_known[address] = written == Error::none;  // after a failed write the value is unknown
+      // after a failed write the host does not know the value of the register
+      is_known[address] = written == Error::none;
       known[address] = value;
       record.written[address] = record.written[address] || is_known[address];
     }
@@ -209,7 +210,7 @@ TEST(BissRegisters, ReadsEveryPositionDuringRegisterAccess) {
   const HostRecord& record = host.machine.found();
   EXPECT_EQ(host.machine.error(), Error::none);
   EXPECT_GE(seen.frames, frames_wanted());
-  EXPECT_EQ(seen.positions, seen.frames);  // no position is missed
+  EXPECT_EQ(seen.positions, seen.frames);  // each frame gave a position
   EXPECT_EQ(seen.wrong, 0u);
   EXPECT_EQ(seen.gaps, 0u);
   EXPECT_EQ(seen.violations, 0u);
@@ -230,7 +231,7 @@ TEST(BissRegisters, FaultsCauseNoWrongRegisterByte) {
   const HostRecord& record = host.machine.found();
   EXPECT_GT(seen.damaged, seen.frames / 500);
   EXPECT_EQ(seen.positions + seen.bad_frames, seen.frames);
-  EXPECT_LE(seen.bad_frames, seen.damaged);  // not more frames are rejected than were damaged
+  EXPECT_LE(seen.bad_frames, seen.damaged);  // the host rejected at most as many frames as were damaged
   EXPECT_EQ(seen.gaps, 0u);
   const auto times = [&seen](sim::FaultKind kind) {
     return static_cast<double>(seen.faults[static_cast<std::size_t>(kind)]);

@@ -82,7 +82,8 @@ constexpr Error take_channel(const Channel& channel, BitView samples, std::size_
   return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
 }
 
-// Returns the upper `bits` bits of the position, preceded by the turns, because near zero one count changes the turns.
+// Returns the upper `bits` bits of the position, with the turns above them: near position 0 a difference of one count
+// also changes the turns.
 template <std::size_t size>
 constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<size>& word, unsigned bits,
                                       unsigned turns) {

@@ -80,7 +80,8 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
     EXPECT_TRUE(encode(format, reply, frame));
     return decode(format, frame.view()).error();
   };
-  // The highest 13 bits are compared: of the 24 bits of the CPW and of the 16 bits of the SPW.
+  // The decoder compares the highest 13 bits of both positions; the position has 24 bits in the CPW and 16 bits in the
+  // SPW.
   EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 8, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 16, 5), Error::cross_check_failed);

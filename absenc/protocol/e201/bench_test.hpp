@@ -29,7 +29,7 @@ inline Tamper answering(char letter, const std::vector<TextReply>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
-/// The virtual interface; `tamper` may answer a command in its place.
+/// The virtual interface on a test line; the function `tamper` may answer a command in its place.
 class TamperedInterface final : public Machine<std::uint8_t> {
  public:
   explicit TamperedInterface(Device<std::uint8_t>& device) : device_(device) {}
@@ -83,7 +83,7 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   Device<std::uint8_t>& device_;
   std::vector<TextReply> pending_texts_;
   TextReply out_;
-  unsigned rest_ = 0;  // remaining bytes of a command `M` that is being received
+  unsigned rest_ = 0;  // number of bytes still to be received of a command `M`
   bool is_tampered_ = false;
   bool busy_ = false;          // whether a transmission is in progress
   bool sending_text_ = false;  // whether the transmission in progress is a text of `tamper`

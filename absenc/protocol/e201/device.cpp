@@ -44,7 +44,7 @@ void VirtualInterface::stopped(Time) {
   zero_ = 0;
 }
 
-// Returns the length without a CR, because it is unknown whether `M` and `B` need one.
+// Returns the length of a command without a CR, because it is unknown whether the commands `M` and `B` need one.
 std::size_t VirtualInterface::request_size(Bytes begin) const {
   return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
 }
@@ -82,7 +82,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
     case letter::hexadecimal:
       append_hexadecimal(reply, (counts(at) - zero_) & low_mask(width_), width_);
       break;
-    default: {  // the reply to `?` and to `1` is the position, which is signed if a zero is set
+    default: {  // the reply to the commands `?` and `1` is the position, which is signed if a zero is set
       const std::uint64_t number = counts(at) - zero_;
       const bool negative = zero_ != 0 && static_cast<std::int64_t>(number) < 0;
       append_text(reply, negative ? "-" : "");

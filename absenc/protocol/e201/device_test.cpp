@@ -87,14 +87,15 @@ TEST(E201Device, AckBitsFollowClock) {
   }
 }
 
-// Checks that a reading takes 64 clocks longer than another command, apart from the reply.
+// Checks that the command that reads a position takes longer than another command by 64 clock periods, and by the time
+// of the longer reply.
 TEST(E201Device, ReadingTakes64Clocks) {
   Bench bench;
   bench.raw("M1");
   const Time slow = bench.run("position").took;
   bench.raw("M4");
   EXPECT_EQ(slow - bench.run("position").took, 64 * (clock_period(1) - clock_period(4)));
-  // The reply to the clock command is 15 characters shorter.
+  // The reply to the command `clock` is 15 characters shorter than the reply to `position`.
   const Time characters = slow - bench.run("clock").took - 64 * clock_period(1);
   EXPECT_LT(std::chrono::abs(characters - line_settings.bits(150)), 1us);
 }

@@ -188,9 +188,9 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
 struct Protocol {
   /// Layout of the encoder's frames and properties of the interface.
   using Format = e201::Format;
-  /// Type of commands to the interface.
+  /// C++ type of the commands to the interface.
   using Request = e201::Request;
-  /// Type of the interface's replies.
+  /// C++ type of the interface's replies.
   using Reply = e201::Reply;
   /// Assumed length of the longest reply in bytes; no document gives it.
   static constexpr std::size_t longest_reply = 32;

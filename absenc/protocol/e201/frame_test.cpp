@@ -30,10 +30,10 @@ TEST(E201Frame, DistinguishesErrorsOfSamples) {
            {"c0014328ff3000000\r", Error::wrong_length},   // a reply with one digit too many
            {"c0014328ff300000\r\n", Error::wrong_length},  // a reply with an LF after the CR
            {"c0014328ff3000\r0\r", Error::bad_framing},    // a reply with a CR among its digits
-           {"80014328ff300000\r", Error::bad_framing},     // the samples begin with 100 instead of 110
+           {"80014328ff300000\r", Error::bad_framing},     // the bits of the frame begin with 1 0 0 instead of 1 1 0
            {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
            {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated
-           {"c0014328ff310000\r", Error::none},            // a bit after the CRC has changed
+           {"c0014328ff310000\r", Error::none},            // a sample behind the CRC is flipped, which is no error
            {"c0014328fe300000\r", Error::bad_checksum},
        })) {
     EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;
@@ -91,7 +91,7 @@ TEST(E201Frame, EncodesAndDecodesRequests) {
     EXPECT_EQ(decoded->letter, request.letter);
     EXPECT_EQ(decoded->clock, request.clock);
   }
-  EXPECT_EQ(Protocol::decode_request({}, bytes("M5")).value().clock, 5u);  // the CR may be missing
+  EXPECT_EQ(Protocol::decode_request({}, bytes("M5")).value().clock, 5u);  // a command may end without its CR
   for (const auto& [text, error] :
        std::to_array<std::pair<std::string_view, std::string_view>>({{"", "wrong_length"},
                                                                      {"q", "unsupported"},
@@ -169,7 +169,8 @@ TEST(E201Frame, FindsNumbersInUndocumentedTexts) {
            {{"5", 5}, {"M3", 3}, {"1", 1}, {"8", 8}, {"1100 kHz", 6}, {"35", 1}, {"4400", 8}, {"9", 0}, {"0", 0}})) {
     EXPECT_EQ(find_clock(bytes(words)).value_or(0), clock) << words;
   }
-  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // only the first nine digits are used
+  // of a number with more than nine digits only the first nine are used
+  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);
   EXPECT_EQ(decode_number(bytes("-17")).value(), -17);
   EXPECT_EQ(decode_number(bytes("+17")).value(), 17);
   EXPECT_EQ(decode_number(bytes("-9223372036854775808")).value(), std::numeric_limits<std::int64_t>::min());

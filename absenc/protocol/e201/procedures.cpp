@@ -64,7 +64,7 @@ Procedure read_info(Dialog& dialog, InterfaceResults& found) {
 
 namespace {
 
-// Sets the clock and reads it back; cross_check_failed: another clock is set afterwards.
+// Sets the clock number and reads it back. Error cross_check_failed: the number read back is another one.
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
   const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
@@ -158,7 +158,7 @@ Outcome failure(const Dialog& dialog, Error error) {
 }
 
 Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
-  Outcome bad = done;  // outcome of the last invalid frame
+  Outcome bad = done;  // outcome of the last invalid frame, returned if no clock gave good frames only
   if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;
@@ -190,7 +190,7 @@ Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments argume
   if (is_too_old(version)) co_return too_old;
   const Reply clock = co_await dialog.ask({letter::clock}).or_say("the interface does not say which clock it has");
   found.previous = static_cast<unsigned>(clock.number);
-  dialog.hold_line(true);  // no other conversation must read positions at a clock of the sweep
+  dialog.hold_line(true);  // no other conversation may read positions while a clock of the sweep is set
   const Outcome outcome = co_await try_clocks(dialog, found);
   found.left = found.previous;
   const Error error = co_await switch_clock(dialog, found.previous);
@@ -237,7 +237,7 @@ constexpr auto of_lines = std::to_array<ErrorExplanation>({
     {Error::bad_framing, {"this is no answer to that command", check_model}},
 });
 
-// Explains bad_framing of a position by the check that failed.
+// Explains the error bad_framing of a position by naming the check of the samples that failed.
 Explanation explain_framing(const Format& format, Bytes reply) {
   const Result<std::uint64_t> samples = decode_samples(reply);
   if (!samples) return {"the interface answers with hexadecimal digits", check_model};

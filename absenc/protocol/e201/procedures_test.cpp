@@ -59,7 +59,8 @@ TEST(E201Read, RefusesContradictingOptions) {
     EXPECT_EQ(made(settings, "position"), readable) << settings;
     EXPECT_EQ(made(settings, "clock-sweep"), readable);
     EXPECT_TRUE(made(settings, "info"));
-    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is not a clock number or frequency
+    // the argument of set-clock, 20, is neither the number of a clock nor a frequency
+    EXPECT_FALSE(made(settings, "set-clock"));
     EXPECT_EQ(unit.device(author::testing::options_of(unit, settings), shaft, device_storage).bytes != nullptr, usable);
   }
 }
@@ -124,7 +125,7 @@ TEST(E201Read, UsesReplyTimeouts) {
   EXPECT_TRUE(says(noisy.advice, "stream-off")) << noisy.advice;
   EXPECT_GT(noisy.took, 100ms);
   EXPECT_LT(noisy.took, 130ms);
-  EXPECT_EQ(bench.answering.asked(), "4");  // on a line that is never silent no further request is sent
+  EXPECT_EQ(bench.answering.asked(), "4");  // the host sends no further request on a line that is never silent
 }
 
 TEST(E201Info, ReportsTextsWithoutNumbers) {
@@ -172,7 +173,7 @@ TEST(E201Set, ReadsClockBack) {
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
-// The host waits 10 ms for an optional reply, and 20 ms more for its end.
+// The host waits 10 ms for the begin of an optional reply, and 20 ms more for the end of this reply.
 TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {
@@ -267,7 +268,7 @@ TEST(E201Zero, RefusesInvalidPosition) {
   EXPECT_EQ(bench.answering.asked(), "4");
 }
 
-// Firmware before 1.16 does not answer `4`, which must not prevent a zero.
+// Firmware before 1.16 does not answer the command `4`; the host must set the zero nevertheless.
 TEST(E201Zero, RefusesEncoderWithoutValidWord) {
   Bench bench;
   const CommandResult stuck = bench.run_tampered(answering('4', {{"0000000000000000\r"}}), "set-zero");

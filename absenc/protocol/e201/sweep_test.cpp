@@ -128,7 +128,9 @@ TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
 
 TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   struct Case {
-    char letter;  // the command whose `nth` request gets `answer`; `always`: every later one too
+    // letter of the command whose request number `nth` gets the reply `answer`; if `always`, every later request of
+    // this command gets it, too
+    char letter;
     int nth;
     bool always;
     std::vector<TextReply> answer;

@@ -60,8 +60,8 @@ constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
 
 /// Firmware version of the interface.
 struct Version {
-  unsigned major;  ///< Number before the point.
-  unsigned minor;  ///< Number after the point.
+  unsigned major;  ///< Number before the point of the version: 1 of 1.16.
+  unsigned minor;  ///< Number after the point of the version: 16 of 1.16.
 };
 
 /// Returns whether this firmware has the command `4` (E201-9S document: since 1.16).

@@ -76,7 +76,7 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
           .line_delay = Time(given.line_delay_ns)};
 }
 
-// The length of a word does not prove a Resolute, so the models of others come first.
+// A word of 26 or 32 bits does not prove that the encoder is a Resolute, so the models of other encoders come first.
 constexpr auto resolute_models = std::array{
     ModelText{"rotary-26", "single-turn, 26 bits", 0,
               "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=other"},

@@ -8,7 +8,7 @@
 
 namespace absenc::e201 {
 
-/// Test frames, each with the fields or the error that decoding must give.
+/// Test replies, each with the fields or the error that decoding must give.
 inline constexpr auto vectors = std::to_array<author::VectorText>({
     {"e201-biss-001", "example 1, 32-bit linear 0.05 um", "seed", "singleturn_bits=32 multiturn_bits=0", "4",
      "c0040030320ffac0\r", "ack_bits=11 singleturn=1579271 angle_deg=0.13237296603620052 error=0 warning=0 crc=61"},

@@ -32,7 +32,8 @@ author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int ti
   };
 }
 
-// Counts the positions during the read of the longest register: each frame must still give a position.
+// While the host reads the longest register, each frame must still give a new position; the test counts the positions
+// that are not new.
 TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
@@ -177,8 +178,8 @@ TEST_P(EncolinkRegister, RestartsAccessAfterDamagedFrame) {
   for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
            {{9, 60, 130}, Error::none},
            {{9, 10, 40, 70}, Error::none},
-           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // all five attempts of the register access fail
-           {{9, 10, 11}, Error::bad_checksum}}) {        // three damaged frames in a row end the command
+           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // this row: all five attempts of the register access fail
+           {{9, 10, 11}, Error::bad_checksum}}) {        // this row: three damaged frames in a row end the command
     Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
     const RunResult read = bench.run("memory-read", {0x4C});
@@ -273,7 +274,7 @@ TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   }
 }
 
-/// Replaces the channel 3 byte of each cycle of seven frames, on a UART.
+/// Replaces the channel 3 byte of each cycle of channel 2, which takes seven frames, on a UART.
 struct OnChannel3 {
   OnChannel3(Bench& bench, std::function<std::uint8_t(std::uint8_t)> change) : change_(std::move(change)) {
     bench.tampered.requests([this](unsigned, RawBytes& request) {
@@ -304,8 +305,8 @@ TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
 
-// In one case the encoder reports that the ring is too eccentric, in the other its counter of calibrations never
-// changes.
+// In the first row the encoder reports that the ring is too eccentric. In the second row the encoder's counter of
+// self-calibrations never changes.
 TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},

@@ -23,7 +23,7 @@ struct Bench : author::testing::UnitBench<20> {
       : UnitBench(interface == Interface::spi ? spi_unit : encolink::unit, settings) {
     shaft.put(7, 0x12345);
   }
-  /// Sends the requests one after the other, padded with zeros to `size`; returns the replies.
+  /// Sends the requests one after the other, each padded with zeros to at least `size` bytes; returns the replies.
   std::vector<RawBytes> ask(std::vector<RawBytes> requests, std::size_t size = 0) {
     std::vector<RawBytes> replies;
     for (RawBytes& request : requests) {
@@ -35,7 +35,7 @@ struct Bench : author::testing::UnitBench<20> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// Base of tests that run on both UART and SPI.
+/// Base class of tests that run on both UART and SPI.
 class OnBothInterfaces : public ::testing::TestWithParam<Interface> {
  protected:
   const Interface interface = GetParam();

@@ -17,7 +17,7 @@ void ChannelFollower::follow(std::uint64_t number, Bytes request, Bytes reply) {
     if (!position) return lose();
     if (format.has_ch2) take_byte(format, number, *position);
   }
-  // A request acts on the channels from the next frame on.
+  // A request has an effect on channels 2 and 3 only from the frame after its reply on.
   if (request.size() < request_bytes) return;
   const auto config = static_cast<Config>(request[0]);
   if (config == Config::position) {

@@ -45,7 +45,8 @@ class ChannelFollower final : public Follower {
   std::uint64_t last_access_from_ = 0;
   bool awaits_answer_ = false;
   ByteBuffer<2 + access_capacity> answer_;
-  bool has_answer_ = false;  // whether the last exchange completed the encoder's answer to the register access
+  // whether the last exchange completed the encoder's answer to the last complete register access
+  bool has_answer_ = false;
 };
 
 }  // namespace absenc::encolink

@@ -53,7 +53,8 @@ TEST(EncolinkDevice, DropsInvalidRequest) {
   Bench bench(testing::single);
   const auto replies = bench.ask({{0xAB, 0x00}, {0x55, 0x00}, position_request, {0xBB}, position_request});
   for (std::size_t i = 0; i < replies.size(); ++i) {
-    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;  // request 3 has only one byte
+    // the request with index 3 has only one byte, so its reply is cut
+    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;
   }
 }
 

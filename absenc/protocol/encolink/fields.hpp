@@ -28,7 +28,7 @@ inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
 
-/// Detail of the error that channels 1 and 2 have different positions.
+/// Detail of the error that the position in a cycle of channel 2 differs from that in channel 1.
 inline constexpr std::string_view channels_disagree =
     "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
 
@@ -70,9 +70,9 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
      "mount the ring again, then `absenc run ... self-calibrate` again"},
 }};
 
-/// Values of a frame, a request or a register access. Only members with a value are reported.
+/// Values of a frame, a request or a register access. Only members that have a value are reported.
 struct Values {
-  /// A value that may be absent.
+  /// C++ type of a member that may have no value.
   template <class T>
   using Maybe = std::optional<T>;
   /// Error and warning bit as one field. This member never has a value: the field only gives names to the status bits
@@ -92,7 +92,8 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  /// Bytes of the register as a number; no value if there are 8 or more, or if a field of its own shows the register.
+  /// Bytes of the register as a number; no value if the register has 8 bytes or more, or if a field of its own reports
+  /// it.
   Maybe<std::int64_t> value{};
 };
 
@@ -158,7 +159,7 @@ inline constexpr auto register_fields = [] {
       field<&RegisterValue::rpm>("", "rpm", "register: speed of the ring"),
       field<&RegisterValue::flags>("", "how the last self-calibration ended", calibration_flags),
       field<&RegisterValue::text>("", "", "register",
-                                  Role::identity));  // all registers with text have numbers that identify the encoder
+                                  Role::identity));  // every register of this kind has text that identifies the encoder
   std::array<FieldInfo, registers.size()> made{};
   for (std::size_t i = 0; i < made.size(); ++i) {
     made[i] = by_content.infos[static_cast<std::size_t>(registers[i].content)];

@@ -68,7 +68,7 @@ enum class Config : std::uint8_t {
 /// Returns whether a byte is a valid first byte of a request.
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
-/// Number of bytes of a request: config and ra (one byte of a register access).
+/// Number of bytes of a request: its purpose (`config`) and one byte of a register access (`ra`).
 inline constexpr std::size_t request_bytes = 2;
 inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity frame, with its checksum.
 /// Number of bytes of an identity frame as the vendor's library reads it.
@@ -107,15 +107,15 @@ struct Format {
 
   /// Returns whether both the resolution and the number of bits of the turns are known.
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
-  /// Returns the number of bytes that the turns take in a frame.
+  /// Returns the number of bytes that a position frame has for the turns: 2, or 0 for a single-turn encoder.
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
-  /// Returns the number of padding bits below the turns.
+  /// Returns the number of padding bits below the turns, which take 16 bits together with this padding.
   [[nodiscard]] constexpr unsigned spare_turns() const {
     return maximum_multiturn_bits - static_cast<unsigned>(multiturn_bits);
   }
   /// Returns the number of bytes of channel 1 (turns and position), without its checksum.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
-  /// Returns the number of bytes of a position frame.
+  /// Returns the number of bytes of a position frame, with its checksum and, if frames have one, its channel 2 byte.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
   /// Returns the number of bytes of a whole cycle of channel 2, which is also its number of frames.
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
@@ -295,7 +295,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return identity;
 }
 
-/// Returns `format` with the resolution of `identity`, and with a number of turn bits that agrees with it.
+/// Returns `format` with the resolution of `identity`. The number of turn bits stays if it agrees with the frame length
+/// in the identity; otherwise it becomes 16 for frames with turns, 0 for frames without.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;
@@ -347,8 +348,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Returns the reading `now`, completed by alarms of the earlier reading `before` that `now` does not report. They are
-/// added only if the error and warning bits of `now` agree with them.
+/// Returns the reading `now`, completed by alarms of the earlier reading `before` that `now` does not report. These
+/// alarms are added only if the error and warning bits of `now` are those that the alarms of `before` cause.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

@@ -85,7 +85,7 @@ TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // If a status bit was clear before and is set now, it is unknown which alarm was raised.
+  // The frame `bad` sets the error bit, which was clear before: it is unknown which error was raised.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);

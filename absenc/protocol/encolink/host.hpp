@@ -27,7 +27,7 @@ struct Frames {
     Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< Second byte of the request: one byte of a register access, or 0.
   };
-  /// Type of replies; empty for the requests `identify` and `identity`.
+  /// C++ type of the replies: a position, which is empty in the replies to `identify` and `identity`.
   using Reply = Position;
   /// Number of bytes of the longest reply, an identity; one more byte may follow it.
   static constexpr std::size_t longest_reply = identity_bytes;
@@ -56,7 +56,7 @@ struct Frames {
     const bool has_position = request.ask == Ask::position || request.ask == Ask::reset;
     return has_position && format.known() ? to_reading(format, reply) : Reading{};
   }
-  /// Returns `sent_at`, the end of the request, which is assumed to be the time of the position.
+  /// Returns `sent_at`, the end of the request, as the time of the position; no document states that time.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the pause that a host keeps between two frames.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
@@ -74,8 +74,8 @@ struct Channels {
   /// Whether all bytes of the last cycle of channel 2 were 0, as while the encoder starts.
   bool silent = false;
 
-  /// Processes the valid frame that `host` has received. If a cycle of channel 2 ends with an error, its alignment
-  /// ends.
+  /// Processes the valid frame that `host` has received. If a cycle of channel 2 ends with an error, `in_step` becomes
+  /// false.
   void take(const author::HostOf<Frames>& host);
 
  private:

@@ -34,7 +34,8 @@ TEST(EncolinkHostSpi, LatchesPositionWhenNcsFalls) {
   bench.pass(1ms);
   const RunResult read = bench.run("position");
   ASSERT_TRUE(read.reading);
-  // The host waits for `spi_pause` before its first transfer, because it does not know when the last one ended.
+  // The host waits for `spi_pause` before its first transfer, because it does not know when the transfer before it
+  // ended.
   EXPECT_EQ(read.reading->latched, 1ms + spi_pause);
   EXPECT_EQ(read.reading->received, 1ms + spi_pause + spi_lead + 40us);
   EXPECT_EQ(read.took, spi_pause + spi_lead + 40us);

@@ -19,7 +19,8 @@ constexpr unsigned cycle_attempts = 3;
 // valid frames.
 constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
-// Greatest number of cycles in which channel 3 may be idle between the last byte of a register access and its answer.
+// Greatest number of cycles of channel 2 in which channel 3 may be idle between the last byte of a register access and
+// the encoder's answer.
 constexpr unsigned idle_cycles_allowed = 8;
 
 constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
@@ -165,7 +166,8 @@ Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
     const AccessOutcome access_outcome = co_await try_to_execute(dialog, found);
-    // Without a good answer, the encoder may still send bytes of it, so the next frame must reset the channels.
+    // If the access got no valid answer, the encoder may still be sending an answer, so the next request must reset the
+    // channels.
     if (access_outcome != AccessOutcome::good) found.in_step = false;
     if (is_lost(dialog, found)) co_return found.end(AccessOutcome::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return access_outcome;
@@ -204,8 +206,8 @@ void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome acc
     dialog.refused();
 }
 
-// Writes a register and reads it back. A write that may have been executed is repeated only if the register has another
-// value.
+// Writes a register and reads it back. If a write may have been executed, the host repeats it only if the register has
+// another value than `value`.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =

@@ -66,7 +66,7 @@ struct ProcedureState : Channels {
     again = can_help;
     return access_outcome;
   }
-  /// Adds the value `bytes` of the register with this index in the table to the results.
+  /// Adds `bytes`, the value of the register with this index in the table `registers`, to the results.
   void add_value(std::size_t index, Bytes bytes) {
     values.push_back({index, {}});
     values[values.size() - 1].bytes.append(bytes);
@@ -106,8 +106,8 @@ author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Argume
 /// Starts the self-calibration, and emits its status while the user turns the shaft.
 author::Procedure self_calibrate(Dialog& dialog, ProcedureState& found);
 
-/// Returns `wanted`. If that is 0, returns the size of the register in the table in bytes, or 0 if the table has no
-/// such register.
+/// Returns `wanted`, a number of bytes. If `wanted` is 0, returns the size in bytes of the register at `address`, or 0
+/// if the table `registers` has no such register.
 [[nodiscard]] std::uint16_t register_size(std::uint32_t address, std::int64_t wanted);
 
 }  // namespace absenc::encolink

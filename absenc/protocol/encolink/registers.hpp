@@ -33,7 +33,7 @@ enum class AccessStatus : std::uint8_t {
   out_of_range = 0x56,
   denied = 0x96,
   read_checksum = 0xE4,
-  /// Status with the same meaning as read_checksum; other code of the vendor uses this value.
+  /// Status with the same meaning as read_checksum; some of the vendor's code has this value instead.
   read_checksum_too = 0xE6,
   byte_count = 0xEE,
   locked = 0xF6,

@@ -124,7 +124,8 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
   return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-// A null function marks a command without a single request: its requests depend on the position, or it sends nothing.
+// A null function marks a command that cannot be encoded as one request: its requests depend on the position, or it
+// sends nothing.
 constexpr MakeRequest not_encodable = nullptr;
 
 // ---- End of a frame: the shortest of the possible lengths with a right checksum decides
@@ -321,7 +322,8 @@ struct FormatEvidence {
   std::size_t identity_at = 0;  // index of the capture with the identity
   // number of captures that are valid position frames: [0] without turns, [1] with turns
   std::array<std::size_t, 2> good{};
-  std::array<std::size_t, 2> first{};  // index of the first such capture: [0] without turns, [1] with turns
+  // index of the first capture that is a valid position frame: [0] without turns, [1] with turns
+  std::array<std::size_t, 2> first{};
 
   [[nodiscard]] bool is_conclusive() const { return identity || good[0] != good[1]; }
   [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
@@ -395,7 +397,8 @@ constexpr Format format_of(const Options& values) {
   made.interface = interface;
   return made;
 }
-// Returns the resolution; unknown members of the format get the values of the virtual encoder.
+// Returns the numbers of bits of position and turns; where the format leaves them unknown, those of the virtual
+// encoder.
 constexpr Resolution resolution_of(const Format& format) {
   return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
           static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};

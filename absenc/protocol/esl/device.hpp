@@ -21,7 +21,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  ///< first condition of a single channel; the condition of channel 2 follows that of channel 1
+  ch1_stuck,  ///< first condition that each channel has for itself; the condition of channel 2 has the next index
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -56,7 +56,7 @@ inline constexpr std::array<Condition, 16> conditions{{
     {"ch2_status_clear", "", "bits of SF of channel 2 that are stuck at 0", 0, 255, 0},
 }};
 
-/// Properties of the virtual encoder's paged memory.
+/// Areas and times of the virtual encoder's paged memory.
 inline constexpr author::PagedMemory paged_memory{
     .areas = memory_map,
     .select_address = page_select_address,
@@ -94,7 +94,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
-    // A reset of the turns (data ID D) permits clearing multiturn_error only if the alarm was raised before it.
+    // A reset of the turns (data ID D) permits clearing multiturn_error only if the alarm was raised before this reset.
     if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
@@ -104,8 +104,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
   }
-  /// Returns the reply to data ID `id` at the time `now`; it has the values of both channels, also those that `id` does
-  /// not carry.
+  /// Returns the reply to data ID `id` at the time `now`. The reply has the values of both channels, also those that
+  /// replies to `id` do not carry.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const {
     Reply reply{.id = id, .encoder_address = profile_.address};
     reply.one = channel_now(Channel::one, now);
@@ -162,7 +162,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // A request with a wrong parity bit has its usual length here, because the reply may report the parity error.
+  // A request with a wrong parity bit counts with its usual length, because the reply may have to report the parity
+  // error.
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -203,8 +204,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // A damaged request: Table 5 demands a report in the status field (SF), the overview demands silence. Replies to
-  // memory requests have no SF, so they report nothing.
+  // Returns whether the reply to a damaged request with this control field reports the error. Table 5 demands a report
+  // in the status field (SF), the overview of the document demands silence: an option decides. Replies to memory
+  // requests have no SF, so they report nothing.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
@@ -222,8 +224,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     resets_.forget();
     encoder_ids_ = 0;
   }
-  // Counts a request for the sequence counters and the resets. Returns whether it is the eighth of a reset and the
-  // shaft is at rest.
+  // Counts a request for the sequence counters and the resets. Returns whether the request is the eighth of a reset and
+  // the shaft is at rest.
   bool count(DataId id, Time at) {
     encoder_ids_ = id == DataId::encoder_id ? encoder_ids_ + 1 : 0;
     if (id == DataId::encoder_id) {
@@ -369,7 +371,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   author::RowCounter resets_{reset_row, rules()};
   unsigned encoder_ids_ = 0;        // number of consecutive requests with data ID 8
   std::uint8_t refused_field_ = 0;  // control field of the last damaged request for this encoder
-  // control field of the last request; if it was for another encoder, that encoder's reply begins with the same byte
+  // control field of the last request; if the request was for another encoder, that encoder's reply begins with this
+  // byte
   std::uint8_t others_field_ = 0;
 };
 

@@ -69,8 +69,8 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
-// The document on bytes that are no request: "Else, it will continue to search for the next available logic of low
-// state."
+// The document demands of an encoder that receives other bytes than a request: "Else, it will continue to search for
+// the next available logic of low state."
 TEST(EslDevice, FindsRequestAfterOtherBytes) {
   for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
                              wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
@@ -129,7 +129,8 @@ struct Alone {
 };
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
-// The second character of the request is damaged; the answer follows the time at which the request would have ended.
+// The second character of the request is damaged. The encoder answers only after the time at which the undamaged
+// request would have ended.
 TEST(EslDevice, ReportsWrongStopBitAfterTheRequest) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
@@ -226,7 +227,8 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  // The reply is busy, because the encoder had fetched the byte at address 7 and must first fetch that at 5.
+  // The encoder replies that it is busy: it had fetched the byte at address 7 and must first fetch the byte at address
+  // 5.
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
 }
 
@@ -360,7 +362,7 @@ TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  // The alarm multiturn_error was raised before the turn reset, so raising it again here changes nothing.
+  // The alarm multiturn_error was raised already when the turns were reset, so raising it again here changes nothing.
   bench.encoder.raise_alarms(alarms::multiturn_error);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);

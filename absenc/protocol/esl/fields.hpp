@@ -75,10 +75,11 @@ struct Shown {
   std::optional<DataId> data_id{};              ///< Data ID of the request or reply.
   std::optional<std::uint8_t> control_field{};  ///< Control field (CF) of a request: encoder address, data ID, parity.
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder on the line (EAD).
-  std::optional<Reply> reply{};  ///< The decoded reply; its data ID decides which of its values are shown.
+  std::optional<Reply> reply{};  ///< The decoded reply; its data ID decides which of its values are reported as fields.
   /// Scan: whether the last of three replies of the address `encoder_address` was damaged.
   std::optional<bool> clash{};
-  std::optional<std::string_view> trouble{};     ///< Scan: sentence about the error of a complete reply.
+  /// Scan: sentence about the error in a complete reply of the address `encoder_address`.
+  std::optional<std::string_view> trouble{};
   std::optional<std::uint8_t> page{};            ///< Page of the memory byte that is accessed.
   std::optional<std::uint8_t> memory_address{};  ///< Address of the memory byte that is accessed (ADF).
   std::optional<std::uint8_t> busy{};            ///< 1: the memory is busy; no byte was read or written.
@@ -90,11 +91,11 @@ struct Shown {
   std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
   /// Memory page that a procedure leaves selected, if it may differ from the page selected before the procedure.
   std::optional<std::uint8_t> page_left{};
-  bool has_turns = true;  ///< whether the turns (ABM) of the reply are shown
+  bool has_turns = true;  ///< whether the turns (ABM) of the reply are reported as a field
 };
 
 namespace detail {
-// Returns `member` of the reply if the reply has `part` in this channel; otherwise no value.
+// Returns `member` of the reply if this channel of the reply carries `part`; otherwise no value.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});
@@ -117,7 +118,7 @@ constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
 }
 }  // namespace detail
 
-/// Table of the fields of requests, replies and results.
+/// Table of the fields in which requests, replies and results of procedures are reported.
 inline constexpr auto fields = [] {
   using author::field;
   using detail::in;
@@ -167,7 +168,8 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// Returns the bits of a reply that carry `field` in its part `id`, whose first byte has the index `here`.
+// Returns the bits of a reply that carry `field`, if the part `id` of the reply carries it; `here` is the index of the
+// first byte of this part.
 template <Channel channel, unsigned id>
 constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;

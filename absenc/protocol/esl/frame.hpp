@@ -129,9 +129,9 @@ enum class DataId : std::uint8_t {
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< Eight consecutive requests make the present position the zero of the turn.
-  clear_alarms = 0xC,     ///< Eight consecutive requests clear alarms.
-  reset_multiturn = 0xD,  ///< Eight consecutive requests set the turns to zero.
+  zero = 0xB,          ///< Eight consecutive requests with this data ID make the present position the zero of the turn.
+  clear_alarms = 0xC,  ///< Eight consecutive requests with this data ID clear alarms.
+  reset_multiturn = 0xD,  ///< Eight consecutive requests with this data ID set the turns to zero.
   read_memory = 0xE,
   write_memory = 0xF,
 };
@@ -206,13 +206,14 @@ struct Layout {
         length_one(length(crc, parts_one)),
         length_two(has_two() ? length(crc, parts_two) : std::uint8_t{0}) {}
 
-  /// Returns whether these replies have channel 2.
+  /// Returns whether replies with this layout have channel 2.
   [[nodiscard]] constexpr bool has_two() const { return two != 0; }
-  /// Returns whether a channel of these replies has a part of the set `any_of`.
+  /// Returns whether a channel of replies with this layout has at least one of the parts in the mask `any_of`.
   [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
 
-  std::uint16_t one = 0;        ///< Mask of the parts that channel 1 has in these replies.
-  std::uint16_t two = 0;        ///< Mask of the parts that channel 2 has in these replies; 0: they have no channel 2.
+  std::uint16_t one = 0;  ///< Mask of the parts that channel 1 has in replies with this layout.
+  /// Mask of the parts that channel 2 has in replies with this layout; 0: they have no channel 2.
+  std::uint16_t two = 0;
   std::uint8_t crc_bytes = 1;   ///< Length of the CRC of a channel in bytes, 1 or 2.
   std::uint8_t length_one = 0;  ///< length of channel 1 in bytes, with control field (CF) and CRC
   /// length of channel 2 in bytes, with control field (CF) and CRC; 0: the replies have no channel 2

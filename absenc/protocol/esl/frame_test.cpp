@@ -272,7 +272,7 @@ TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
     const Explanation why = unit.explain(values, Error::request_rejected, {.bytes = asked}, {.bytes = refused});
     EXPECT_NE(why.detail.find("wrong parity bit"), std::string_view::npos) << why.detail;
   }
-  // A reply to the same request that reports no parity error does not give request_rejected.
+  // A reply that reports no parity error does not give request_rejected, although the request has a wrong parity bit.
   reply.one.status = status::ready;
   reply.two.status = status::ready | status::channel_2;
   const ReplyBytes taken = encode_reply({}, reply, field);

@@ -102,8 +102,8 @@ Explanation failed_part(Sentence& words, DataId id, const Reply& before, const R
   if (now.multiturn != 0) {
     return {"the turns are still not zero", "hold the shaft still, then `absenc reset-multiturn` again"};
   }
-  // According to rev 1.4 of the document, data ID D also clears the single-turn position; other revisions and places do
-  // not say so.
+  // According to rev 1.4 of the document, a reset with data ID D also clears the single-turn position. Other revisions,
+  // and other places in rev 1.4, do not say so.
   if (author::is_near(now.singleturn, before.singleturn, singleturn_bits)) return {};
   return {"the turns are zero, but the encoder has moved its single-turn zero too", "find the origin again"};
 }
@@ -280,7 +280,8 @@ Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // The memory page stays selected after the procedure, so it is read back to verify that it is the page from before.
+  // The memory page that this request selects stays selected after the procedure, so the host reads back whether it is
+  // the page that was selected before the procedure.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

@@ -16,12 +16,12 @@ using Dialog = author::DialogOf<Protocol>;
 /// Result of an ESL procedure other than `scan`.
 struct ProcedureResult : Shown {
   Reading reading{};                     ///< Reading of the last reply; empty if the procedure reads no position.
-  ByteBuffer<last_address + 1> bytes{};  ///< memory bytes that the field `data` shows
+  ByteBuffer<last_address + 1> bytes{};  ///< storage of the memory bytes that are reported in the field `data`
   Sentence words{};                      ///< storage of the text that explains an error
 };
 
-/// Reads the encoder id with data ID 8; a request with data ID 5 before it breaks a row of eight. Error besides those
-/// of the exchanges: unexpected_reply.
+/// Reads the encoder id with data ID 8. Sends a request with data ID 5 before it, so that an encoder never receives
+/// eight consecutive requests with data ID 8. Error besides those of the exchanges: unexpected_reply.
 author::Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found);
 
 /// Result of `read_safely`: a safe position. The procedure emits one result after the other.

@@ -38,10 +38,11 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
   EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
-  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder has noticed that its host broke the rule
+  // the virtual encoder has reported that it received data ID 8 eight times in a row
+  ASSERT_EQ(bench.violations(), 1u);
 }
 
-// The host pauses for at least two bits between a reply and its next request.
+// The host pauses for at least the duration of two bits between a reply and its next request.
 TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
   const std::vector<std::pair<const char*, std::vector<std::int64_t>>> commands{{"position", {}},
                                                                                 {"position", {}},
@@ -147,7 +148,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   unsigned safe = 0;
   bench.line.on_emit = [&] {
     if (++safe == 10) {
-      // the sequence counter of channel 1 stays at its value in the last reply
+      // from here on both sequence counters stand still at 11, their value in the last reply
       bench.condition(condition::ch1_sequence, 11);
       bench.condition(condition::ch2_sequence, 11);
     }
@@ -160,7 +161,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   EXPECT_EQ((*made).reading(), nullptr);
 }
 
-// Tests each value of each option for a property that the document leaves open, at address 5.
+// Sets each value of each option that decides a property which the document leaves open; the encoder has address 5.
 TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
@@ -224,7 +225,7 @@ TEST(EslHost, ExplainsInvalidReplies) {
   }
 }
 
-// After damaged characters the host explains nothing, because their content is unknown.
+// If characters of the reply were damaged, the host does not explain the error, because their content is unknown.
 TEST(EslHost, DoesNotExplainDamagedReplies) {
   using LinkEvent = Event<std::uint8_t>;
   const testing::Talk made(unit, testing::options_of({}), "position");

@@ -42,8 +42,8 @@ Profile with_other_parity(Profile profile) {
   return profile;
 }
 
-// The request of a capture, decoded as far as a profile permits; without a captured request, the one that the reply
-// echoes.
+// The request of a capture, decoded as far as a profile permits. If the request was not captured, it is the request
+// that the reply echoes.
 struct SentRequest {
   Request request{};
   bool parity_wrong = false;
@@ -89,7 +89,8 @@ struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // The lowest rank is for a profile under which the encoder would not have answered the request.
+  // The lowest rank is for `request_not_accepted`: under such a profile the encoder would not have answered the
+  // request.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -107,7 +108,7 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: the progress of the best profile with this value.
+// For each value of an option: the progress of that profile with this value which explains the most captures.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
@@ -116,8 +117,9 @@ void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByV
   values.fill({});
   bool known = false;
   std::uint8_t last = 0;
-  std::uint8_t safety = 0;   // number of replies with a sequence counter since the last one that was received
-  std::uint8_t request = 0;  // number of requests since the last sequence counter that was received
+  // number of replies with a sequence counter after the last captured counter, up to the present reply
+  std::uint8_t safety = 0;
+  std::uint8_t request = 0;  // number of requests after the last captured sequence counter, up to the present request
   for (std::size_t i = 0; i < captures.size(); ++i) {
     ++request;
     if (captures[i].reply.empty()) {  // without a reply it is unknown whether the encoder counted the request
@@ -167,7 +169,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  // The start value is the least progress that a profile can have.
+  // Each value of each option begins with the least progress that a profile can have.
   for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);
@@ -218,7 +220,7 @@ Profile changed(Profile profile, const OptionValue& change) {
 
 }  // namespace
 
-// The request is no evidence, because the host encoded it with `profile`; only the reply is.
+// Only the reply is evidence for other option values: the host itself has encoded the request with `profile`.
 Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
   const Capture capture{.reply = reply};
   Buffer<OptionValue, 2> found;

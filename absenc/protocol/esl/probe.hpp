@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the profiles (option values) that fit captured frames; they decide what the document leaves open.
+// Finds the profiles (values of the options) that fit captured frames. The options decide properties of the encoder
+// that the document leaves open.
 #pragma once
 
 #include <span>

@@ -60,8 +60,8 @@ const std::vector<Request> everything{{DataId::position},    {DataId::temperatur
                                       {DataId::position},    {DataId::clear_alarms},
                                       {DataId::calibration}, {DataId::write_memory, 0, page_select_address, 8}};
 
-// For each value of each open option, the frames of an encoder with this value must show that it is possible, and if
-// they can, that no other is.
+// For each value of each option that the document leaves open: the frames of an encoder with this value must show that
+// the value is possible and, if they can show it, that no other value is.
 TEST(EslProbe, EveryValueIsFound) {
   for (std::size_t option = 0; option < open_options; ++option) {
     const std::string_view name = options.infos[option].name;
@@ -125,7 +125,7 @@ TEST(EslProbe, ReportedParityErrorShowsTheScope) {
 }
 
 TEST(EslProbe, OpenOptionsAreFirst) {
-  EXPECT_EQ(open_options, 10u);  // README.md names each of these ten options
+  EXPECT_EQ(open_options, 10u);  // README.md names each of the ten options for properties that the document leaves open
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;
 }

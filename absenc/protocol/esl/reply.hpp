@@ -351,7 +351,8 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
 
-/// Rules for the requests of a reset (Table 4); 40 us from start to start are typical.
+/// Rules for the requests of a reset (Table 4). Typical are 40 us from the start of one request to the start of the
+/// next.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -365,9 +366,9 @@ inline constexpr author::InARow reset_row{
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = Profile;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = esl::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
@@ -395,7 +396,7 @@ struct Protocol {
   static constexpr auto decode = decode_reply;
   /// Returns the position and turns of a valid reply; no turns if the profile's encoder counts none.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
-    // The data ID is taken from the request, where the compiler may know it.
+    // The data ID is taken from the request instead of the reply, because the compiler may know the request.
     Reading reading = to_reading(request.id, reply);
     if (!profile.turns) reading.multiturn_bits = 0;
     if (!profile.turns) reading.multiturn_valid = false;

@@ -43,7 +43,8 @@ class SafetyMonitor {
   /// Constructs a monitor for an encoder of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
-  /// Returns the data ID for the next request: `wanted` if the last replies were good, otherwise 1 and 2 in turn.
+  /// Returns the data ID for the next request: `wanted` if the last replies were good, otherwise the data IDs 1 and 2
+  /// in turn.
   [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
     if (trust_ == Trust::full) return wanted;
     return last_id_ == DataId::position ? DataId::singleturn : DataId::position;

@@ -175,7 +175,8 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned tried = 0;
     unsigned near = 0;
     off = 0;
-    // Stuck positions in steps that take each value of the top 9 bits twice.
+    // The position at which the channel stands still takes values in steps of 0x4001 counts, so that each value of its
+    // top 9 bits occurs twice.
     for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001, ++tried) {
       const bool is_near = std::abs(wrapped_difference(stuck >> 15, 0x123456 >> 15, 9)) <= 1;
       (is_near ? near : accepted) += accepted_with(of_it(condition::ch1_stuck), stuck, 4, off);
@@ -349,7 +350,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
     print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
     EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
 
-    // Here the host gets every reply one cycle late, so in the first cycle it gets none.
+    // Here the host gets every reply one cycle late, so it gets no reply in the first cycle.
     unsigned late = 0;
     pair.trust();
     Wire held = pair.reply_to(pair.monitor.next_id());

@@ -69,7 +69,7 @@ constexpr Result<Request> request_behind(const Profile& profile, Bytes request, 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// Returns the failed check of the reply that gives the error `error`; `passed` if there is none.
+// Returns the check that the reply has failed if decoding the reply gave the error `error`; `passed` if it failed none.
 Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;

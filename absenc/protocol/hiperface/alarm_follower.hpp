@@ -10,8 +10,9 @@
 
 namespace absenc::hiperface {
 
-/// Joins a captured position with the error bit to the status replies of the same encoder that follow it directly. It
-/// stops when a status code comes again or is no alarm. With each joined status reply it makes a composed frame.
+/// Joins a captured position with the error bit to the status replies of the same encoder that follow it directly. The
+/// follower stops when a status code comes again or is no alarm. It makes a new composed frame after each status reply
+/// that it has joined.
 class AlarmFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.
@@ -37,7 +38,7 @@ class AlarmFollower final : public Follower {
     const std::uint32_t alarm = alarm_of(static_cast<std::uint8_t>(got->value));
     is_complete_ = (alarm & ~alarms_) == 0;
     alarms_ |= alarm;
-    // without an alarm, the error bit may be that of an earlier request, so no frame is composed
+    // a position whose status names no alarm may have the error bit of an earlier request, so no frame is composed
     if (alarms_ == 0) return;
     request_.append(request);
     reply_.append(reply);
@@ -55,7 +56,8 @@ class AlarmFollower final : public Follower {
 
  private:
   Format format_;
-  // requests for the position and the status; empty while there is no position with the error bit
+  // bytes of the request for the position and of the joined requests for the status; empty while no captured position
+  // has the error bit
   RequestBytes request_;
   ReplyBytes reply_;
   std::uint32_t alarms_ = 0;  // mask of the alarms in the joined status replies

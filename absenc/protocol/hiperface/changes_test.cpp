@@ -60,7 +60,8 @@ void ignore(Bench& bench, std::uint8_t code, std::uint8_t subject) {
 TEST(HiperfaceChanges, LostOrDamagedReplyIsDecidedByReadingBack) {
   for (const bool lost : {true, false}) {
     for (const Change& change : changes) {
-      // the command 4F (access code) has no reading back; its second request shows whether the encoder has the new code
+      // no request reads the access code back; after command 4F (change an access code) the host sends a second request
+      // 4F, which shows whether the encoder has the new code
       if (change.code == 0x4F) continue;
       SCOPED_TRACE(change.command);
       Bench bench(unit, known);
@@ -138,7 +139,7 @@ TEST(HiperfaceChanges, PositionThatMayBeInvalidIsNotChanged) {
 }
 TEST(HiperfaceChanges, BaudRateThatTakesEffectAfterResetIsWaitedFor) {
   Bench bench(unit, known);
-  bench.device.raise_alarms(alarm_of(0x1D));  // a reset of the encoder ends this alarm
+  bench.device.raise_alarms(alarm_of(0x1D));  // a reset of the encoder ends the alarm with status code 1D
   ignore(bench, 0x57, 0xE6);
   bench.tampered.replies([](unsigned nth, Wire& reply) {
     if (reply[1] == 0xD0) reply = framed({0x40, 0x57, 0xE6});
@@ -147,7 +148,8 @@ TEST(HiperfaceChanges, BaudRateThatTakesEffectAfterResetIsWaitedFor) {
   const RunResult failed = bench.run("set-baud", {38400});
   EXPECT_EQ(failed.error, Error::cross_check_failed);
   EXPECT_TRUE(failed.says("after a reset")) << failed.detail;
-  // The encoder does not answer two times three requests at the new rate, and the reset takes 500 ms.
+  // The encoder does not answer at the new rate: the host sends two times three requests. In between it resets the
+  // encoder, which takes 500 ms.
   EXPECT_GE(failed.took, 800ms);
   bench.tampered.replies({});
   EXPECT_EQ(bench.run("status").numbers.at("alarms"), 0);

@@ -34,10 +34,12 @@ class VirtualEncoder final : public author::Responder {
   static constexpr std::size_t address_at = 0;
   static constexpr std::size_t interface_at = 1;
   static constexpr std::size_t codes_at = 2;  // index of the access codes 0 to 3 in the memory, 1 byte each
-  // position that the encoder sends, minus the position of the shaft; 4 bytes
+  // index in the memory of a difference, 4 bytes: the position that the encoder sends, minus that of the shaft
   static constexpr std::size_t offset_at = 6;
   static constexpr std::size_t counter_at = 10;
-  static constexpr std::size_t fields_at = 14;  // for each data field one byte with its status, then its bytes
+  // index in the memory of the data fields: one byte with the status of a field, then the bytes of the field, for each
+  // field
+  static constexpr std::size_t fields_at = 14;
   static constexpr std::size_t field_stride = 1 + field_capacity;
   static constexpr std::size_t memory_size = fields_at + user_fields * field_stride;
   // Data fields 0 and 1 exist at shipping. Each has 128 bytes, is writable, and needs access code 1.
@@ -86,10 +88,11 @@ class VirtualEncoder final : public author::Responder {
   const Shaft* shaft_;
   std::array<std::uint8_t, memory_size> memory_{};
   std::int64_t temperature_ = conditions[0].normal;
-  // mask of the alarms that status replies have reported since the round over all alarms began
+  // mask of the alarms that status replies have reported already; cleared when all raised alarms are in it, so that the
+  // replies report all alarms again
   std::uint32_t sent_ = 0;
-  std::uint8_t refusal_ = 0;     // status code of the next refusal
-  std::uint32_t next_rate_ = 0;  // rate that the line gets as soon as nothing is being sent; 0: the rate stays
+  std::uint8_t refusal_ = 0;     // status code with which the encoder answers the next request that it refuses
+  std::uint32_t next_rate_ = 0;  // baud rate that the line gets as soon as nothing is being sent; 0: the rate stays
 };
 
 }  // namespace absenc::hiperface

@@ -72,7 +72,7 @@ struct Values {
   std::optional<bool> clash{};
 };
 
-/// Table of the fields of requests, replies and results.
+/// Table of the fields in which requests, replies and results of procedures are reported.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;

@@ -232,9 +232,10 @@ inline constexpr auto texts = std::array<std::string_view, 10>{
 
 /// A type of encoder as the type label states it; encoders of one or more families have it.
 struct Type {
-  std::uint8_t id;          ///< Number of the type in the type label.
-  std::string_view name;    ///< Names of the encoder families of this type.
-  Resolution resolution{};  ///< Numbers of bits of position and turns; 0 and 0: the type does not show them.
+  std::uint8_t id;        ///< Number of the type in the type label.
+  std::string_view name;  ///< Names of the encoder families of this type.
+  /// Numbers of bits of position and turns; 0 and 0: the type label does not show them for this type.
+  Resolution resolution{};
 };
 /// Table of all types whose names drivers know.
 inline constexpr auto types = std::array{
@@ -277,8 +278,8 @@ inline constexpr auto type_resolutions = [] {
   return {};
 }
 
-/// Returns the type that has these numbers of bits. If there is none, returns the type whose resolution data field FF
-/// describes.
+/// Returns the number of the type that has these numbers of bits. If there is none, returns the number of the type
+/// whose resolution is described in data field FF.
 [[nodiscard]] constexpr std::uint8_t type_with(const Resolution& bits) {
   for (const Type& type : types) {
     if (type.resolution.singleturn_bits == bits.singleturn_bits &&
@@ -308,7 +309,7 @@ struct Format {
   std::uint8_t rate = rate_at_shipping;         ///< Index of the line's baud rate in `rates`.
   /// Type of the encoder in the type label; 0: not stated, the virtual encoder then has a type with its resolution.
   std::uint8_t type = 0;
-  std::uint8_t status_bytes = 1;   ///< Number of bytes of the status in a reply, 1 or 2.
+  std::uint8_t status_bytes = 1;   ///< Number of bytes of the status code in a status reply or a refusal, 1 or 2.
   std::uint8_t counter_bytes = 3;  ///< Number of bytes of the counter in a reply, 1 to 4.
   /// Number of bytes of the free memory in a reply. 1: it is in blocks of 16 bytes; 2: it is in bytes.
   std::uint8_t free_bytes = 1;

@@ -30,8 +30,8 @@ struct Reply {
   std::array<std::uint8_t, 4> label{};  ///< Type label: interface setting, type, memory in blocks of 16 bytes, options.
   FieldBytes data{};                    ///< Bytes of a data field, or characters of serial number and program version.
   std::uint32_t alarms = 0;  ///< Mask of the alarms in the status replies that a capture joins to a position.
-  /// In a position joined to status replies: whether another status code may follow that makes the position invalid,
-  /// because the last code names a new alarm or is in no source.
+  /// For a position that is joined to status replies: whether the encoder may report another status code that makes the
+  /// position invalid, because the last joined code names an alarm for the first time or is in no source.
   bool is_open = false;
 };
 
@@ -240,7 +240,7 @@ constexpr void judge(Reading& reading, std::uint32_t raised, std::uint32_t repor
   reading.singleturn_known = reading.multiturn_known = true;
 }
 
-/// Changes the validity of those parts of the reading that count as valid to unknown.
+/// Sets the validity of position and turns in a reading to unknown where they count as valid.
 constexpr void doubt(Reading& reading) {
   if (std::exchange(reading.singleturn_valid_bits, 0) != 0) reading.singleturn_known = false;
   if (std::exchange(reading.multiturn_valid, false)) reading.multiturn_known = false;
@@ -271,9 +271,9 @@ constexpr void doubt(Reading& reading) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = hiperface::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = hiperface::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = hiperface::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
@@ -321,7 +321,8 @@ struct Protocol {
   static constexpr auto request_size = request_length;
   /// Returns the greatest length in bytes of the reply to `request`; 0 if the encoder does not answer it.
   static constexpr auto reply_size = reply_length;
-  /// Returns the times of a virtual encoder.
+  /// Returns the times of a virtual encoder: until its reply, from power on until it answers, and until it drops an
+  /// incomplete request.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     const Time character = format.line().character();
     return {character, answer_time, start_time, reply_characters * character};

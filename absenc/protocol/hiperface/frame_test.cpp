@@ -47,8 +47,8 @@ TEST(HiperfaceFrame, EncodesThePositionsThatHpmicroPrints) {
 }
 
 TEST(HiperfaceFrame, DecodesThePositionsOfTheEncoderThatHpmicroReads) {
-  // Lines of the log of HPMicro's master sample, of 2023. They print the turns, the position within the turn in the
-  // highest bits, and the checksum with its bits reversed.
+  // Lines of the log of HPMicro's master sample, of 2023. A line prints the turns, the position within the turn shifted
+  // to the highest bits of 32, and the checksum with its bits reversed.
   struct Line {
     std::uint16_t turns;
     std::uint32_t position;

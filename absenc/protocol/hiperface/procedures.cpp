@@ -32,8 +32,8 @@ Request description_request(const Format& format) {
 // Result of reading the status several times, because an encoder reports its alarms one after the other.
 struct Codes {
   std::uint32_t alarms = 0;  // mask of the alarms that the status codes name
-  std::uint8_t first = 0;    // status code of the first reply
-  bool unexplained = false;  // whether one of the status codes is in no source
+  std::uint8_t first = 0;    // status code in the first reply to the requests for the status
+  bool unexplained = false;  // whether at least one of the status codes is explained by no source
 };
 
 // Reads the status until the encoder sends a code for the second time or a code that is no alarm.
@@ -138,7 +138,8 @@ Part<bool> store_position(Dialog& dialog, ProcedureResult& found, std::uint32_t 
 
 // ---- Data fields
 
-// Returns an error if no encoder has these bytes of a data field, or they cannot be written; otherwise no error.
+// Returns an error if no encoder has these bytes of a data field, or if `writes` is true and they cannot be written;
+// otherwise no error.
 Outcome objection_to_access(std::int64_t field, std::int64_t first, std::int64_t count, bool writes) {
   const MemoryArea* const area = find_area(memory_areas, static_cast<unsigned>(field), static_cast<unsigned>(first));
   const bool fits = area != nullptr && first + count <= area->first + area->count;

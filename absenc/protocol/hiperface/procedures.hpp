@@ -14,10 +14,12 @@ namespace absenc::hiperface {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: the values of its fields, a reading, and the bytes that fields show.
+/// Result of a procedure: the values of its fields, a reading, and storage for bytes to which the values refer.
 struct ProcedureResult : Values {
-  Reading reading{};   ///< Position and turns; empty if the procedure read none.
-  FieldBytes bytes{};  ///< Bytes that fields with bytes or text show.
+  Reading reading{};  ///< Position and turns; empty if the procedure read none.
+  /// Storage of the bytes of a data field, or of the characters of a serial number or program version, that are
+  /// reported.
+  FieldBytes bytes{};
 };
 
 /// Converts an argument, whose value is 0 to 255, to a byte.
@@ -43,7 +45,7 @@ struct ProcedureResult : Values {
 
 /// Reads the position. If the reply has the error bit, also reads the status, to learn whether the position is valid.
 author::Procedure read_position(Dialog& dialog, ProcedureResult& found);
-/// Reads the status until a code comes again or is no alarm, and reports the alarms that the codes name.
+/// Reads the status until a status code comes again or is no alarm, and reports the alarms that the codes name.
 author::Procedure read_status(Dialog& dialog, ProcedureResult& found);
 /// Reads the type label, the serial number and the program version; skips the last two if the encoder refuses them. If
 /// the type needs it, also reads the description in data field FF.

@@ -79,12 +79,12 @@ struct Request {
   }
 }
 
-/// Numbers of bytes that a command has between its code and the checksum.
+/// Numbers of bytes between the command code and the checksum, in the request and the reply of one command.
 struct DataSizes {
   std::uint8_t request = 0;  ///< Number of bytes in the request; for command 4B without the bytes to store.
   std::uint8_t reply = 0;    ///< Number of bytes in the reply; for command 4A without the bytes that were read.
-  /// Least number of bytes in the reply. It is smaller than `reply` for commands whose reply no source shows: the reply
-  /// may repeat bytes of the request or not.
+  /// Least number of bytes in the reply. It is smaller than `reply` for commands of which no source shows a reply: such
+  /// a reply may or may not repeat bytes of the request.
   std::uint8_t least = 0;
 };
 
@@ -173,7 +173,7 @@ constexpr void append_data(RequestBytes& bytes, const Request& request) {
 }  // namespace detail
 
 namespace detail {
-// Appends the frame of a request. Requests for the status that a capture joins to it are not appended.
+// Appends the frame of a request, without the requests for the status that a capture joins to this request.
 constexpr void append_frame(RequestBytes& bytes, const Request& request) {
   const std::size_t begin = bytes.size();
   bytes.push_back(request.address);

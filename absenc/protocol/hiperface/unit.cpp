@@ -91,7 +91,8 @@ template <CommandCode command>
 constexpr Request plain(const Format& format, Arguments = {}) {
   return plain_request(format, command);
 }
-// Returns a request of `command` whose next byte is the first argument, or `subject` if there are no arguments.
+// Returns a request of `command` whose byte behind the command code is the first argument, or `subject` if there are no
+// arguments.
 template <CommandCode command, std::uint8_t subject = 0>
 constexpr Request about(const Format& format, Arguments arguments) {
   Request request = plain_request(format, command);
@@ -336,8 +337,8 @@ std::string_view length_contradiction(CommandCode command, std::int64_t size, By
   return "a reply has another length";
 }
 
-// Stores the resolution that a captured type label or description reports, if the options leave it open. Returns false
-// if the encoder reports another resolution than the options state.
+// Stores in `values` the resolution that a captured type label or description reports, if the options do not state it.
+// Returns false if the encoder reports another resolution than the options state.
 bool take_resolution(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const Format said = options.format(values);
   for (std::size_t i = 0; i < captures.size(); ++i) {

@@ -20,7 +20,7 @@ inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x
 inline constexpr std::size_t frame_capacity = 256;
 inline constexpr std::size_t shortest_frame = 4;  ///< Length of the shortest frame in bytes: address, function, CRC.
 inline constexpr std::size_t crc_size = 2;        ///< Length of the CRC in bytes.
-/// Bytes of one frame.
+/// Buffer for the bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
 
 inline constexpr std::uint8_t first_address = 1;   ///< Lowest address of a server; 0 is broadcast and never answered.
@@ -29,7 +29,7 @@ inline constexpr std::uint8_t last_address = 247;  ///< Highest address of a ser
 inline constexpr std::uint8_t read_holding_registers = 0x03;  ///< Function code that reads holding registers.
 /// Greatest number of registers in one read request (MODBUS Application Protocol, 6.3).
 inline constexpr std::uint16_t most_registers = 125;
-/// Bit of the function code that marks a refusal; functions of the standard are below it.
+/// Bit of the function code that marks a refusal; the function codes of the standard are smaller than this value.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
 /// Byte order of a CRC in a frame; `wrong`: the CRC matches in neither order.

@@ -30,7 +30,7 @@ TEST(ModbusFrame, RecognizesCrcOfOtherByteOrder) {
   EXPECT_EQ(crc_order({}), CrcOrder::wrong);
 }
 
-// MODBUS over Serial Line, 6.2.2: the checksum must detect one wrong bit, or two, anywhere in a frame of this length.
+// MODBUS over Serial Line, 6.2.2: the CRC must detect one or two wrong bits at any place of a frame of nine bytes.
 TEST(ModbusFrame, DetectsAnyTwoWrongBits) {
   const std::vector<std::uint8_t> good(hex<"010304001fabcd7550">.begin(), hex<"010304001fabcd7550">.end());
   for (std::size_t one = 0; one < good.size() * 8; ++one) {

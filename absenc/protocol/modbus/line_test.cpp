@@ -109,7 +109,7 @@ struct Bench {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::optional<std::size_t> host;
   Wire last_reply;             // last reply that `ask` received
-  std::vector<Time> silences;  // durations of all silences on the line that were longer than a character
+  std::vector<Time> silences;  // durations of all silences on the line that were longer than the time of a character
   Time last_end{};
 };
 
@@ -205,14 +205,14 @@ TEST(ModbusLine, ServerReportsGapsInsideFrame) {
 TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   Bench bench;
   bench.raw(good_request);
-  // The gap limit of 1 us ends the exchange as soon as the reply is complete.
+  // The client's gap limit of 1 us ends the exchange as soon as the reply is complete.
   bench.raw(good_request, {}, 50ms, 1us);
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
   EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
 }
 
-// A server that was scheduled late does not know how long the client waited.
+// A server whose process the operating system scheduled late does not know how long the client was silent.
 TEST(ModbusLine, LateServerReportsNoMissingSilence) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {
@@ -222,7 +222,8 @@ TEST(ModbusLine, LateServerReportsNoMissingSilence) {
       server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
       Time now = 50ms + frame_silence(line_settings) + late;
       server.feed({.kind = Kind::silence, .at = now});
-      static_cast<void>(server.next(now));  // takes the configure step that power on requested
+      // the server's first step is the change of the rate that it requested at power on
+      static_cast<void>(server.next(now));
       ASSERT_EQ(server.answer_count(), 1u);
       if (replied) server.feed({.kind = Kind::sent, .at = now});
       server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});
@@ -248,7 +249,7 @@ TEST(ModbusLine, ServerChangesRateAfterReply) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-// If bytes that are no reply arrive without a pause, the client stops.
+// If bytes that are no reply arrive without a pause, the client ends its conversation.
 TEST(ModbusLine, ClientStopsOnEndlessNoise) {
   ToyClient client(request_body);
   Time now{};

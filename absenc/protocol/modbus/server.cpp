@@ -7,7 +7,8 @@ namespace {
 
 // Time between the silence that ends a request and the reply; the standard states none.
 constexpr Time answer_time = 200us;
-// If a silence is reported later than this, the client may have timed out, so its next request breaks no timing rule.
+// If the silence after a request is reported to the server later than this, the client may have timed out, so the
+// client's next request breaks no timing rule.
 constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
@@ -40,7 +41,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
-  // A frame that does not end with its CRC is not complete.
+  // A frame whose last two bytes are not its CRC is not complete, so the server waits for more bytes.
   if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;
   return step;
 }

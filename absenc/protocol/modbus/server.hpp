@@ -78,7 +78,7 @@ class Server : public Device<std::uint8_t> {
   CrcOrder crc_order_ = CrcOrder::low_first;
   bool reply_pending_ = false;
   bool transmitting_ = false;
-  bool interrupted_ = false;  // something was received during the present transmission
+  bool interrupted_ = false;  // the client sent something during the server's present transmission
   Time reply_at_{};
   HostRules rules_;
   std::uint64_t answer_count_ = 0;

@@ -35,7 +35,7 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),
-          // The patience is longer than any reply of the units that use these times.
+          // The limit `patience` is longer than any reply of the units that use these times.
           .patience = 1s};
 }
 

@@ -78,13 +78,16 @@ struct Bus {
     pass(2ms);
     return host.received;
   }
-  // Sends a request when the time `pause` has passed since the last reply, and waits for its reply.
-  void ask_after_reply(const Request& request, Time pause) {
+  // Begins to send a request at the time `at`, and waits for its reply.
+  void ask_at(const Request& request, Time at) {
     const RequestBytes bytes = encode_request({}, request);
-    const Time at = host.times.empty() ? line.now() : host.times.back() + pause;
     host.begin({bytes.view().begin(), bytes.view().end()}, at);
     line.wake(node);
     while (host.received.size() < reply_length(request.code)) pass(1us);
+  }
+  // Sends a request when the time `pause` has passed since the last reply, and waits for its reply.
+  void ask_after_reply(const Request& request, Time pause) {
+    ask_at(request, host.times.empty() ? line.now() : host.times.back() + pause);
   }
   // Sends a request and returns the reply of the first encoder that answers; an empty reply after an error.
   OneReply reply(const Request& request, const Format& format = {}) {
@@ -133,6 +136,16 @@ TEST(NikonBus, AllEncodersOfALineAnswerInTurn) {
     EXPECT_EQ(bus.ask({.code = Code::position, .address = static_cast<std::uint8_t>(i)}).size(), 8u);
   }
   EXPECT_EQ(bus.violations(), 0u);
+}
+
+TEST(NikonBus, PauseBetweenEncodersDependsOnTheRate) {
+  constexpr std::array<Time, rates.size()> pauses{3us, 2us, 2us, 1500ns, 1500ns};
+  for (std::uint8_t rate = 0; rate < rates.size(); ++rate) {
+    const Format format{.rate = rate};
+    Bus bus({0, 1}, format);
+    ASSERT_EQ(bus.ask({.code = Code::all_positions}, format).size(), 16u);
+    EXPECT_EQ(bus.host.times[8] - bus.host.times[7], pauses[rate] + format.line().byte_time()) << rates[rate];
+  }
 }
 
 TEST(NikonBus, EncodersKeepTheirSlotsWhereOthersAreMissing) {
@@ -244,6 +257,18 @@ TEST(NikonBus, BusyEepromDoesNothing) {
   EXPECT_EQ(bus.data({.code = Code::read_memory, .word = 1}), 0x010007u);
   EXPECT_EQ(bus.data({.code = Code::read_identity}), 0xABCDEFu);
   EXPECT_EQ(bus.violations(), 2u);
+}
+
+TEST(NikonBus, EepromIsBusyAsLongAsTheSourcesSay) {
+  for (const auto& [code, busy] : {std::pair{Code::read_memory, Time(300us)}, {Code::write_memory, Time(30ms)}}) {
+    for (const Time early : {Time(1us), Time{}}) {
+      Bus bus({0});
+      const Request request{.code = code, .word = 1, .value = code == Code::write_memory ? 7u : 0u};
+      bus.ask_at(request, Time(1ms));
+      bus.ask_at(request, Time(1ms) + busy - early);
+      EXPECT_EQ(bus.violations(), early > Time{} ? 1u : 0u) << unsigned(code);
+    }
+  }
 }
 
 TEST(NikonBus, EepromKeepsItsWordsWithoutPower) {

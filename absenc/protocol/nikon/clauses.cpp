@@ -8,7 +8,7 @@
 namespace absenc::nikon {
 namespace {
 
-/// Mask of the bits that clearing the alarms must clear: all but the bits about the EEPROM.
+/// Mask of the alarm bits that must be clear after the alarms were cleared: all but memory_busy.
 constexpr std::int64_t cleared_alarms = alarm::all & ~alarm::memory_busy;
 
 /// Requirements on encoders with the A-format.

@@ -34,7 +34,8 @@ class VirtualEncoder final : public author::Responder {
     memory_[address_at] = format.address;
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// Ends the alarms `bits`. Without this, an alarm ends when a reset clears it or the power goes off.
+  /// Ends the alarms `bits`. Without a call of this function, an alarm ends when a reset clears it or the power goes
+  /// off.
   void lower_alarms(std::uint32_t bits) override { latches_ &= static_cast<std::uint16_t>(~bits); }
   /// Raises the alarms `bits`.
   void raise_alarms(std::uint32_t bits) override { latches_ |= static_cast<std::uint16_t>(bits & alarm::all); }
@@ -67,8 +68,8 @@ class VirtualEncoder final : public author::Responder {
       take_turn(one * address(), one * encoder_count);
     }
     if (!is_reset(request->code)) resets_.end();
-    // The replies to requests of a reset, and to command code 20, have the address and the alarms from before the
-    // change.
+    // The reply to a request of a reset or to command code 20 (give an address) has the address and the alarms from
+    // before the reset or the new address.
     const OneReply before{.address = address(), .status = status(at), .data = data_for(*request, at)};
     reply.append(encode_reply(request->code, before).view());
     if (is_reset(request->code)) count_reset(*request, at);
@@ -83,7 +84,8 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Data of replies
 
-  // Returns the status bits (ES): 1 if an alarm is raised. No source explains them.
+  // Returns the status bits (ES). No source states their meanings; this encoder sends 1 if an alarm is raised,
+  // otherwise 0.
   [[nodiscard]] std::uint8_t status(Time at) const { return alarms_at(at) != 0 ? 1 : 0; }
   [[nodiscard]] std::uint64_t data_for(const Request& request, Time at) {
     const std::uint64_t counts = position(at);
@@ -180,8 +182,8 @@ class VirtualEncoder final : public author::Responder {
     if (address == temperature_address) return static_cast<std::uint16_t>(quarters());
     return static_cast<std::uint16_t>(address < user_words ? load(2 * std::size_t{address}, 2) : 0);
   }
-  // Executes a read or write request for the EEPROM unless it is busy. Returns the word that the request before has
-  // fetched, with its address.
+  // Executes a read or write request for the EEPROM unless the EEPROM is busy. Returns the word that the encoder has
+  // fetched for the previous request, with its address.
   [[nodiscard]] std::uint64_t access_memory(const Request& request, Time at) {
     const bool ready = is_ready(at);
     if (ready && fetching_) fetched_ = {*fetching_, word(*fetching_)};

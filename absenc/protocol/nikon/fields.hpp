@@ -47,11 +47,12 @@ struct Values {
   std::optional<std::uint16_t> value{};      ///< Value of a word of the EEPROM.
   std::optional<Bytes> data{};               ///< Words of the EEPROM from `address` on, the low byte of each first.
   std::optional<std::uint32_t> identification{};  ///< Identification code of the encoder, 24 bits.
-  std::optional<bool> written{};                  ///< True if a value was written; false if the encoder had it already.
+  /// True if the word, identification or address was written; false if the encoder had it already.
+  std::optional<bool> written{};
   std::optional<bool> clash{};  ///< Scan: true if no reply of the address was valid and at least one was damaged.
 };
 
-/// Table of the fields of requests, replies and results.
+/// Table of the fields in which requests, replies and results of procedures are reported.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;

@@ -131,7 +131,7 @@ struct Format {
   return code == Code::set_address || code == Code::read_only_identity || code == Code::write_only_identity ||
          code == Code::assign_address;
 }
-/// Returns whether this command code is executed only after eight requests in a row.
+/// Returns whether an encoder executes this command code only after eight consecutive requests with it.
 [[nodiscard]] constexpr bool is_reset(Code code) { return code >= Code::clear_alarms && code <= Code::zero; }
 /// Returns whether replies to this command code have an identification as their data.
 [[nodiscard]] constexpr bool has_identity(Code code) {

@@ -94,7 +94,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
 
 /// Parameters of the CRC-8 of replies: x^8 + x^4 + x^3 + x^2 + 1, start 0.
 inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
-/// Returns the CRC-8 of the bytes of a reply, in the bit order of the byte that follows them.
+/// Returns the CRC-8 of `bytes`, the bytes of a reply before its CRC, as the byte that is sent behind them.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Returns the bytes of a request.

@@ -43,7 +43,8 @@ TEST(NikonFrame, ChecksumsAreThoseThatAnotherVendorPrints) {
     EXPECT_EQ(singleturn_in({}, Code::position, decoded->data), singleturn);
     EXPECT_EQ(multiturn_in({}, Code::position, decoded->data), 0x8888u);
   }
-  // The checksum in the README's first line fits a reply whose first frame is still 0.
+  // The first line that the README prints has a checksum that fits only if the first frame of the reply (two bytes) is
+  // 0.
   const Wire first{0x00, 0x00, 0xA5, 0xFF, 0x8F, 0x88, 0x08};
   EXPECT_EQ(reflect(checksum(first), 8), 0xA9u);
 }
@@ -72,7 +73,9 @@ TEST(NikonFrame, RequestsDecodeToWhatWasEncoded) {
 
 TEST(NikonFrame, RefusesBadRequests) {
   const auto error = [](const Wire& bytes) { return decode_request({}, bytes).error(); };
+  EXPECT_EQ(error({}), Error::wrong_length);
   EXPECT_EQ(error({0x02}), Error::wrong_length);
+  EXPECT_EQ(error({0x04, 0x00, 0x00}), Error::wrong_length) << "the length is checked before the sync code";
   EXPECT_EQ(error({0x02, 0x00, 0x5A}), Error::wrong_length);
   EXPECT_EQ(error({0x02, 0x00, 0x5A, 0x02}), Error::wrong_length);
   EXPECT_EQ(error({0x04, 0x00}), Error::bad_framing);

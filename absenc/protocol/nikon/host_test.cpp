@@ -123,6 +123,29 @@ TEST(NikonHost, Reads17Bits) {
   EXPECT_EQ(part.error(), Error::none);
 }
 
+// ---- Places of fields
+
+TEST(NikonPlaces, AreThoseOfOneReplyToAValidRequest) {
+  const Options options = author::testing::options_of(unit, "");
+  const FieldInfo& singleturn = *std::ranges::find(unit.fields, "singleturn", &FieldInfo::name);
+  const auto places = [&](const Wire& request, const Wire& reply) {
+    return unit.bits(options, {.bytes = request}, {.bytes = reply}, singleturn).size();
+  };
+  const Wire request = testing::wire(encode_request({}, {.code = Code::position}).view());
+  const Wire reply = testing::wire(encode_reply(Code::position, {}).view());
+  EXPECT_GT(places(request, reply), 0u);
+  EXPECT_GT(places({}, reply), 0u);
+  Wire damaged = request;
+  damaged[1] ^= 0x20;
+  EXPECT_EQ(places(damaged, reply), 0u);
+  const Wire all = testing::wire(encode_request({}, {.code = Code::all_positions, .address = 7}).view());
+  const Wire one = testing::wire(encode_reply(Code::all_positions, {}).view());
+  Wire two = one;
+  two.insert(two.end(), one.begin(), one.end());
+  EXPECT_GT(places(all, one), 0u);
+  EXPECT_EQ(places(all, two), 0u);
+}
+
 // ---- The order of bits that captures show
 
 struct Evidence final : EvidenceSink {
@@ -130,7 +153,8 @@ struct Evidence final : EvidenceSink {
   std::vector<OptionEvidence> all;
 };
 
-// Returns the bit order that a probe of these captures finds, 0 or 1; -1 if they contradict both orders.
+// Returns the value of the option bit_order that a probe of these captures finds, 0 or 1; -1 if the captures contradict
+// both.
 std::int64_t probed(std::span<const Capture> captures, Evidence& evidence, std::string_view settings = "") {
   Options options = author::testing::options_of(unit, settings);
   const auto is_order = [](const Option& option) { return option.name == "bit_order"; };

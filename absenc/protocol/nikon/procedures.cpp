@@ -203,7 +203,7 @@ Procedure assign_address(Dialog& dialog, ProcedureResult& found, Arguments argum
     co_return done;
   }
   if (!*found.written) co_return {Error::invalid_argument, other_there, "choose a free one: `absenc scan` lists them"};
-  // If the reply is lost, an answer at the new address shows whether the encoder took it.
+  // If the reply to this request is lost, an answer at the new address shows whether the encoder took the address.
   static_cast<void>(
       co_await dialog.attempt({.code = Code::assign_address, .address = wanted, .value = identity}).changes());
   co_await find_at(dialog, found, wanted, identity);

@@ -9,10 +9,11 @@ namespace absenc::nikon {
 /// The conversation through which procedures send requests.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: the values of its fields, a reading, and words of the EEPROM.
+/// Result of a procedure: the values of its fields, a reading, and storage of EEPROM words.
 struct ProcedureResult : Values {
-  Reading reading{};                   ///< Position and turns with their alarms; empty if the procedure read none.
-  ByteBuffer<2 * word_count> words{};  ///< words of the EEPROM that the field `data` shows, the low byte of each first
+  Reading reading{};  ///< Position and turns with their alarms; empty if the procedure read none.
+  /// storage of the EEPROM words that the field `data` reports, the low byte of each first
+  ByteBuffer<2 * word_count> words{};
 };
 
 /// Sends the eight requests of a reset (command code 8, 9, 10 or 12), and verifies the result. Errors:

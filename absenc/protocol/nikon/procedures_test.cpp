@@ -203,6 +203,20 @@ TEST(NikonProcedures, WritesTheIdentificationOnlyIfItDiffersAndReadsItBack) {
   EXPECT_TRUE(later.run("set-identification", {7}).says("could not be read back"));
 }
 
+// The encoder needs 30 ms to store what it was sent; only then does a reply show what it has stored.
+TEST(NikonProcedures, ReadsBackWhenTheEncoderHasStored) {
+  Bench bench;
+  for (const auto& [command, arguments] :
+       {std::pair<std::string_view, std::vector<std::int64_t>>{"memory-write", {1, 7}},
+        {"set-identification", {7}},
+        {"address", {5}},
+        {"assign-address", {6, 7}}}) {
+    const auto ended = bench.run(command, arguments);
+    EXPECT_EQ(ended.numbers.at("written"), 1) << command;
+    EXPECT_GE(ended.took, 30ms) << command;
+  }
+}
+
 TEST(NikonProcedures, OnlyEncoderOfALineGetsAnotherAddress) {
   Bench bench("address=2");
   const auto moved = bench.run("address", {5});

@@ -20,7 +20,8 @@ namespace absenc::nikon {
   if (one == Code::with_alarms) return static_cast<std::uint16_t>(data >> 24 & alarm::all);
   return std::nullopt;
 }
-/// Returns the position within the turn in the data of a reply; no value if the reply does not have all its bits.
+/// Returns the position within the turn in the data of a reply; no value if the reply does not carry all bits of the
+/// position.
 [[nodiscard]] constexpr std::optional<std::uint64_t> singleturn_in(const Format& format, Code code,
                                                                    std::uint64_t data) {
   const Code one = single(code);
@@ -67,7 +68,7 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   return reading;
 }
 
-/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` reports, as Unit::remembered
 /// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if (now.alarms_reported == 0 && before.alarms != 0) judge(now, before.alarms);
@@ -78,9 +79,9 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = nikon::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = nikon::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = nikon::Reply;
   /// Greatest length in bytes of all replies to one request together.
   static constexpr std::size_t longest_reply = encoder_count * longest_one;

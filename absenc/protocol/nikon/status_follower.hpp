@@ -42,11 +42,12 @@ class StatusFollower final : public Follower {
     const Result<Request> asked = decode_request(format_, request);
     if (!asked) return false;
     const Result<Reply> answered = decode_reply(format_, *asked, reply);
-    if (!answered || answered->count != 1) return false;
+    if (!answered) return false;
     const Reading reading = to_reading(format_, asked->code, *answered);
     return reading.singleturn_bits + reading.multiturn_bits != 0 && reading.alarms_reported == 0;
   }
-  // Adds an exchange to the stored one. Returns true if it reads the alarms of the same encoder, false for any other.
+  // Adds an exchange to the stored one. Returns true if the added exchange reads the alarms of the same encoder,
+  // otherwise false.
   bool add_alarms(Bytes request, Bytes reply) {
     if (!request_.append(request) || !reply_.append(reply)) return false;
     const Result<Request> both = decode_captured(format_, request_);

@@ -12,13 +12,20 @@ namespace {
 
 using Wire = std::vector<std::uint8_t>;
 
+Wire wire(const auto& bytes) { return {bytes.view().begin(), bytes.view().end()}; }
+
 constexpr OneReply alarmed{.address = 2, .status = 1, .data = 77};
 constexpr OneReply battery{.address = 2, .status = 1, .data = alarm::battery};
 
 /// Feeds the follower with captured exchanges.
 struct Conversation {
+  explicit Conversation(const Format& format = {}) : follower(format) {}
+
   void exchange(const Request& request, const OneReply& reply) {
-    follower.follow(number++, encode_request({}, request), encode_reply(request.code, reply));
+    follow(encode_request({}, request), encode_reply(request.code, reply));
+  }
+  void follow(Bytes request, Bytes reply) {
+    follower.follow(number++, request, reply);
     Composed one;
     composed.reset();
     if (follower.take(one)) {
@@ -32,7 +39,7 @@ struct Conversation {
   }
   void alarms(const OneReply& reply = battery) { exchange({.code = Code::alarms, .address = reply.address}, reply); }
 
-  StatusFollower follower{Format{}};
+  StatusFollower follower;
   std::uint64_t number = 5;
   std::optional<Wire> composed;  // request of the last composed frame; no value if there is none
   Wire composed_reply;
@@ -86,6 +93,32 @@ TEST(NikonFollower, AnotherEncoderIsNotMeant) {
   EXPECT_FALSE(seen.composed);
 }
 
+TEST(NikonFollower, RepliesOfSeveralEncodersAreNotComposed) {
+  const Request asked{.code = Code::all_short_positions, .address = 7};
+  Wire replies;
+  for (const std::uint8_t address : {std::uint8_t{2}, std::uint8_t{5}}) {
+    const auto one = encode_reply(asked.code, {.address = address, .status = 1});
+    replies.insert(replies.end(), one.view().begin(), one.view().end());
+  }
+  Conversation seen({.singleturn_bits = short_bits});
+  seen.follow(encode_request({}, asked), replies);
+  seen.alarms();
+  EXPECT_FALSE(seen.composed);
+}
+
+TEST(NikonFollower, DamagedExchangesAreNotComposed) {
+  Wire request = wire(encode_request({}, {.code = Code::position, .address = 2}));
+  Wire reply = wire(encode_reply(Code::position, alarmed));
+  for (Wire* const damaged : {&request, &reply}) {
+    Conversation seen;
+    damaged->back() ^= 0x20;
+    seen.follow(request, reply);
+    damaged->back() ^= 0x20;
+    seen.alarms();
+    EXPECT_FALSE(seen.composed);
+  }
+}
+
 TEST(NikonFollower, RepliesWithAlarmsNeedNoOthers) {
   for (const Code code : {Code::with_alarms, Code::alarms, Code::temperature}) {
     Conversation seen;
@@ -127,6 +160,21 @@ TEST(NikonFrame, BothRepliesOfACaptureAreChecked) {
   EXPECT_EQ(decode_reply({}, asked, bytes).error(), Error::bad_checksum);
   EXPECT_EQ(decode_reply({}, asked, Bytes(bytes).first(4)).error(), Error::wrong_length);
   EXPECT_FALSE(decode_reply({}, asked, joined({.address = 3})));
+  Request other = asked;
+  other.status_address = 3;
+  EXPECT_EQ(decode_reply({}, other, joined(battery)).error(), Error::unexpected_reply) << "encoder 3 was asked";
+}
+
+TEST(NikonFrame, AlarmsOfACaptureBelongToOneEncoder) {
+  const Request asked{.code = Code::all_positions, .address = 7, .with_status = true, .status_address = 2};
+  Wire bytes;
+  for (const std::uint8_t address : {std::uint8_t{2}, std::uint8_t{5}}) {
+    const auto one = encode_reply(Code::all_positions, {.address = address, .status = 1});
+    bytes.insert(bytes.end(), one.view().begin(), one.view().end());
+  }
+  const auto alarms = encode_reply(Code::alarms, battery);
+  bytes.insert(bytes.end(), alarms.view().begin(), alarms.view().end());
+  EXPECT_EQ(decode_reply({}, asked, bytes).error(), Error::unexpected_reply);
 }
 
 }  // namespace

@@ -181,15 +181,15 @@ std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   const Result<Request> request =
       capture.request.empty() ? request_of_reply(capture.reply) : decode_request({}, capture.request);
   if (!request || !is_memory_access(request->code)) return std::nullopt;
-  if (capture.reply.size() != reply_length(request->code)) return std::nullopt;
   const Result<Reply> reply = decode_reply({}, *request, capture.reply);
   if (!reply || reply->data >> 16 != temperature_address) return std::nullopt;
   return reply->data & 0xFFFF;
 }
-// Finds the order of the bits. The EEPROM word 0xF9, a temperature, has only 10 bits, so its zeros can show the order.
+// Finds the value of the option bit_order. The EEPROM word 0xF9, a temperature, has only 10 bits: its other six bits
+// are 0 and can show in which order the bits are sent.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const std::size_t option = options.find("bit_order");
-  // For each bit order the index of the first capture that contradicts it.
+  // For each bit order: index of the first capture that contradicts this order; no value if none does.
   std::array<std::optional<std::size_t>, order_names.size()> against{};
   for (std::size_t i = 0; i < captures.size(); ++i) {
     const std::optional<std::uint64_t> word = temperature_word(captures[i]);

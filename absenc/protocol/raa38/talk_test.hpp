@@ -39,7 +39,7 @@ struct CommandResult {
   Error error = Error::none;
   std::string words{};   // detail and advice of the error
   std::string fields{};  // "name=value name=value ", without real numbers
-  std::string left{};    // fields that `report_left` reports, as text like `fields`
+  std::string left{};    // fields that the ended conversation gives to `report_left`, as text like `fields`
   std::optional<Reading> reading{};
   Time took{};
 
@@ -58,8 +58,8 @@ template <class Item>
   return end;
 }
 
-/// Checks that a conversation ended with this error and these texts; after an error it must have no fields and no
-/// reading.
+/// Checks that a conversation ended with `error` and that the detail or advice of the error contains `words`. After an
+/// error the conversation must have reported no fields and no reading.
 [[nodiscard]] inline ::testing::AssertionResult ended(const CommandResult& end, Error error,
                                                       std::string_view words = {}) {
   const bool good = end.error == error && says(end.words, words);
@@ -115,7 +115,7 @@ struct Bench {
   };
 
   Format format;
-  sim::testing::TestShaft<21> shaft;  // shaft with 21 bits, the finest resolution of these encoders
+  sim::testing::TestShaft<21> shaft;  // shaft with 21 bits, the finest resolution of an RAA38S6
   sim::Line<Item> line;
   std::list<Encoder> encoders;
   std::optional<std::size_t> host_end{};

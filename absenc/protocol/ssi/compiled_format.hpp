@@ -7,7 +7,7 @@
 
 namespace absenc::ssi {
 
-/// A format with its word compiled.
+/// An SSI format whose position word is compiled, so that many words are decoded fast.
 class CompiledFormat {
  public:
   /// Compiles `format`, which is copied.

@@ -33,7 +33,7 @@ class CompiledFormat;
 struct Format {
   using Compiled = CompiledFormat;           ///< The format compiled (compiled_format.hpp), to decode many words.
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
-  AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
+  AfterWord after_word = AfterWord::repeat;  ///< Bits that the encoder sends if the host clocks on after the word.
   /// Number of clocks after the word, whose bits are compared with `after_word`.
   unsigned extra_clocks = 0;
   Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
@@ -48,7 +48,7 @@ struct Format {
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
   /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`.
   Time monoflop = 20us;
-  std::uint32_t slowest_khz = 100;  ///< Slowest clock that the virtual encoder allows, in kHz.
+  std::uint32_t slowest_khz = 100;  ///< Slowest clock in kHz that the virtual encoder accepts from a host.
   /// Fastest clock that the virtual encoder allows, in kHz; its period is the document's Tcs.
   std::uint32_t fastest_khz = 250;
 };
@@ -58,8 +58,8 @@ inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///
 /// Returns the number of clocks of one reading: the word and the extra clocks.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
-/// Returns bit number `index`, from 0, that an encoder sends if the clock never stops. Its word begins at bit `first`
-/// of `word`.
+/// Returns bit number `index`, from 0, of the bits that an encoder sends if the clock never stops: its word, then the
+/// bits that follow the word. The word begins at bit `first` of `word`.
 [[nodiscard]] constexpr bool bit_after_word(const Format& format, BitView word, std::size_t index,
                                             std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
@@ -78,7 +78,8 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // If one of the bits before the last `word` bits is 1, the number that was read exceeds every position.
+  // If a bit before the last `word` bits is 1, the number read is greater than any position: `word` is the number of
+  // bits of a position word.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }

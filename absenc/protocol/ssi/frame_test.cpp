@@ -38,7 +38,8 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // Without extra clocks, `decode` accepts the word read once or twice.
+  // If the format has no extra clocks, `decode` accepts the bits of one word, and also those of the same word sent
+  // twice.
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
@@ -71,7 +72,7 @@ TEST(SsiFrame, ChecksBitsAfterWord) {
   EXPECT_EQ(decode(one, "00011110111101").error(), Error::cross_check_failed);
   EXPECT_EQ(decode(zero, "11111111111111").error(), Error::line_stuck);
   EXPECT_EQ(decode(one, "00000000000000").error(), Error::line_stuck);
-  EXPECT_TRUE(decode(zero, "00000000000000"));  // all bits 0 are the position 0
+  EXPECT_TRUE(decode(zero, "00000000000000"));  // a word whose bits are all 0 is valid: its position is 0
 }
 
 TEST(SsiFrame, EncodeFailsWithoutRoom) {

@@ -13,9 +13,9 @@ namespace absenc::ssi {
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
-  /// Empty type: a host of SSI encoders sends no requests.
+  /// C++ type of requests, which is empty: a host of SSI encoders sends no requests.
   using Request = author::NoRequest;
-  /// Type of the decoded word.
+  /// C++ type of the decoded word.
   using Reply = Word;
   static constexpr unsigned most_clocks = frame_capacity;  ///< Greatest number of clocks in one transfer.
 

@@ -92,7 +92,7 @@ TEST(SsiHost, RejectsSecondWordThatIsTooFarAway) {
   const Format format{.word = word_format({.position = 17}), .confirm_rpm = 6000};
   const Word at{.position = 1000};
   EXPECT_TRUE(can_follow(format, at, at, 100us));
-  // 6000 rpm are 100 turns a second: 1310 counts in 100 us.
+  // At 6000 rpm, 100 turns a second, the position of 17 bits changes by 1310 counts in 100 us.
   EXPECT_TRUE(can_follow(format, at, {.position = 2300}, 100us));
   EXPECT_TRUE(can_follow(format, at, {.position = (1u << 17) - 300}, 100us));
   EXPECT_FALSE(can_follow(format, at, {.position = 2330}, 100us));

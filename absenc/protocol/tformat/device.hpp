@@ -163,7 +163,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (!is_reset(request.id)) resets_.end();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
-    // the reply has more values than its data ID carries; encode_reply uses only those that it carries
+    // the reply has more values than its data ID carries; encode_reply puts only those of the data ID into the frame
     reply.id = request.id;
     if (is_reset(request.id)) count_reset(request.id, at);  // the tenth reply of a reset still shows the old alarms
     return reply;
@@ -240,7 +240,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // If the turn counter overflows and turns back before the next update, the overflow is not detected.
+    // If the turn counter overflows and turns back before the next call of this function, it does not detect the
+    // overflow.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
@@ -275,7 +276,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       const std::int32_t limit = at - from < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
       if (magnitude(state.speed_millirpm) <= power_off_speed && magnitude(state.acceleration) <= limit) continue;
       latches_ |= alarms::over_speed;
-      ++turn_offset_;  // over_speed means that the turns are wrong, so the counter misses one turn
+      // over_speed means that the turns are wrong, so the virtual encoder makes its counter miss one turn
+      ++turn_offset_;
       return;
     }
   }
@@ -301,7 +303,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   bool zero_pending_ = false;
   std::int64_t zero_request_ = 0;  // angle in counts that becomes the zero when the EEPROM is written
-  std::int64_t zero_turns_ = 0;    // number of turns that must be the same after the zero was written to the EEPROM
+  // number of turns that the encoder must report unchanged after the zero was written to the EEPROM
+  std::int64_t zero_turns_ = 0;
 
   author::RowCounter resets_{reset_row, rules()};
   std::uint8_t refused_status_ = 0;

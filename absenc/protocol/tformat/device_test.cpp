@@ -309,7 +309,8 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 0u);
   EXPECT_EQ(ask(thrice), 2u);
   EXPECT_EQ(ask(thrice), 4u);
-  // After one request alone, the encoder excuses three that are delivered late and together: the host may have waited.
+  // After it has received a single request, the encoder excuses three requests that arrive late and together: the host
+  // may have waited for each reply.
   EXPECT_EQ(ask(once), 4u);
   EXPECT_EQ(ask(thrice), 4u);
 }

@@ -59,16 +59,17 @@ struct Values {
   std::optional<std::uint8_t> busy{};         ///< 1: the encoder is busy and did not execute the request.
   std::optional<std::uint8_t> value{};        ///< Value of the memory byte (EDF).
   std::optional<Bytes> data{};  ///< Values of several memory bytes, from `address` on, low addresses first.
-  std::optional<std::int8_t> temperature{};          ///< Temperature of the board, in degC.
-  std::optional<bool> overheat_enabled{};            ///< Whether the encoder raises over_heat above its threshold.
+  std::optional<std::int8_t> temperature{};  ///< Temperature of the board, in degC.
+  /// Whether the encoder raises the alarm over_heat above the threshold `overheat_threshold`.
+  std::optional<bool> overheat_enabled{};
   std::optional<std::uint8_t> overheat_threshold{};  ///< Temperature above which over_heat is raised, in degC.
   std::optional<bool> written{};  ///< True if the memory byte was written; false if it had the value already.
-  /// Memory page that a procedure has, or may have, left selected, although another page may have been selected before
-  /// it.
+  /// Memory page that a procedure has left selected, or may have left selected, if it may differ from the page that was
+  /// selected before.
   std::optional<std::uint8_t> page_left{};
 };
 
-/// Table of the fields of requests, replies and results.
+/// Table of the fields in which requests, replies and results of procedures are reported.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;

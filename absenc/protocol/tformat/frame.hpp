@@ -57,7 +57,8 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// Rules for the requests of a reset (paragraph 10); it does not state where the 40 us between them begin and end.
+/// Rules for the requests of a reset (paragraph 10). The paragraph does not state from which point of a request to
+/// which point of the next one the 40 us are measured.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -288,7 +289,8 @@ struct KnownAlarms {
   unsigned raised = before.raised & ~unsigned{alarms::counting_error};
   if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
   if ((sf_reported & status::alarm) == 0) {
-    // the status bit is not valid, so the known state of the four alarms behind it stays
+    // the status bit `alarm` is not valid, so it changes nothing in the known state of the four alarms for which it
+    // stands
   } else if ((sf & status::alarm) == 0) {
     reported |= together;
     raised &= ~together;
@@ -358,10 +360,10 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   return to_reading(format, reply.id, reply, known_alarms);
 }
 
-/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` reports, as Unit::remembered
 /// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  // this reading is of a reply to data ID 3, which reports all alarms
+  // `now` is the reading of a reply to data ID 3, which reports all alarms
   if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
   detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status), now.status_reported));
@@ -374,9 +376,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = tformat::Format;
-  /// Type of the protocol's requests.
+  /// C++ type of the protocol's requests.
   using Request = tformat::Request;
-  /// Type of the protocol's replies.
+  /// C++ type of the protocol's replies.
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
@@ -403,7 +405,7 @@ struct Protocol {
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   /// Returns the position and turns of a valid reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    // The data ID is taken from the request, where the compiler may know it.
+    // The data ID is taken from the request instead of the reply, because the compiler may know the request.
     return to_reading(format, request.id, reply);
   }
   /// Returns the end of the request: the document does not say when the encoder latches the position.
@@ -418,7 +420,8 @@ struct Protocol {
   }
   /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t reply_size(const Format&, const Request& request) { return reply_length(request.id); }
-  /// Returns the times of a virtual encoder.
+  /// Returns the times of a virtual encoder: until its reply, from power on until it answers, and until it drops an
+  /// incomplete request.
   static constexpr author::DeviceTimes device_times(const Format&) {
     const Time character = line_settings.character();
     // the silence that ends a frame is one character: the frame ends where a start bit is missing (9.2)

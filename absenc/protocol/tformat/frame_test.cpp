@@ -62,7 +62,7 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
       const Error error = decode_reply(format, {DataId::everything}, bad).error();
       if (error != Error::bad_checksum) ++crc_passes;
       if (error == Error::none) ++strict_passes;
-      // The second count allows any value of the upper four bits of the status field (SF).
+      // The count `lax_passes` allows any value of the upper four bits of the status field (SF).
       bad[1] &= 0x0F;
       bad[10] = checksum(bad.view().first(10));
       const Error fixed_bits = decode_reply(format, {DataId::everything}, bad).error();

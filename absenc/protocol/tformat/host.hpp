@@ -43,7 +43,7 @@ class ReadPosition : public author::HostOf<Protocol> {
     }
     // the reading is constructed in place, because a copy costs time
     new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));
-    // The end of the request is taken as the time of the position: the document does not state when it is latched.
+    // The document does not state when the position is latched, so the end of the request is taken as this time.
     reading_.latched = sent_at();
     reading_.received = received_at();
     finish(Error::none);

@@ -21,16 +21,17 @@ using namespace author;
 
 using Dialog = DialogOf<Protocol>;
 
-// Result of a T-format procedure: the values of its fields, its reading, and the bytes that a field shows.
+// Result of a T-format procedure: the values of its fields, its reading, and the memory bytes that the field `data`
+// reports.
 struct ProcedureResult : Values {
   Reading reading{};
-  ByteBuffer<page_addresses> bytes{};  // memory bytes that the field `data` shows
+  ByteBuffer<page_addresses> bytes{};  // storage of the memory bytes that the field `data` reports
   std::optional<std::uint8_t> selected{};
 };
 
 // ---- Resets (10)
 
-// Returns an error if the positions in these two replies forbid a reset; otherwise no error.
+// Returns an error if the positions in the replies `first` and `second` forbid a reset; otherwise no error.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);

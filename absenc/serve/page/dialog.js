@@ -10,7 +10,9 @@ const body = document.getElementById("dialog-body");
 const wrong = document.getElementById("dialog-wrong");
 const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
-const WRITING_MS = 300;  // time without a key press, in milliseconds, after which the encoder is asked for the value
+// time without a key press in the fields of a command, in milliseconds, after which the dialog reads the present value
+// from the encoder
+const WRITING_MS = 300;
 
 /** Asks the user. `agree` runs on consent and returns "" or an error text. Resolves to whether the user agreed. */
 function ask(words, button, nodes, agree) {

@@ -6,7 +6,7 @@ import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure,
 
 const MANY = 30;           // number of encoders above which the cards are small
 const FEW = 3;
-// With many encoders: shortest time per encoder between two redraws, in milliseconds.
+// With more than MANY encoders, two redraws of the overview are at least DRAW_MS milliseconds per encoder apart.
 const DRAW_MS = 5;
 const ORDER_MS = 2000;     // minimum time between two automatic reorderings of the cards, in milliseconds
 const MINUTE_S = 60;
@@ -15,7 +15,7 @@ const MOST_WORDS = 2;
 /** Creates the large figure with its unit, for a card or the page of an encoder. */
 export function figureNode() {
   const digits = element("span", {class: "digits"});
-  // invisible text that keeps the figure as wide as its widest value so far
+  // invisible text that keeps the large number of a card as wide as the widest value shown so far
   const widest = element("span", {class: "widest", "aria-hidden": "true"});
   const unit = element("span", {class: "unit"});
   const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
@@ -133,8 +133,8 @@ class Card {
 
   drawTrace(now, live) {
     const column = sparkColumn(this.points, this.encoder.linear);
-    // Continues a rotary position over the end of a turn: steps of more than half a turn, as from 360 to 0 degrees,
-    // become short.
+    // Continues a rotary position past the end of a turn: a step of more than half a turn between two points, as from
+    // 359 to 1 degree, becomes the short step, here 2 degrees.
     let turns = 0;
     const unwrapped = this.points.map((row, i) => {
       const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;

@@ -49,7 +49,8 @@ export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
 
 function drawMarks(canvas, area, graph, marks) {
-  const free = [area.x, area.x, area.x];  // x coordinate at which each of three rows of labels is free again
+  // for each of three rows of event labels: the x coordinate behind its last label, where the next label may begin
+  const free = [area.x, area.x, area.x];
   for (const event of marks) {
     const x = Math.round(graph.toDomXCoord(event.at_ms)) + .5;
     if (x < area.x || x > area.x + area.w) continue;
@@ -115,8 +116,8 @@ export class Trace {
     let low = Infinity;
     let high = -Infinity;
     let before = null;
-    // Positions are drawn within one turn if the shaft turns less than half a turn within each row and from row to
-    // row.
+    // Positions are drawn within one turn if the shaft turns less than half a turn within each row of the history, and
+    // from each row to the next.
     const fits = within && rows.every((row, i) => row[2] === null ||
       (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {

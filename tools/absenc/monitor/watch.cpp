@@ -146,8 +146,9 @@ void Watch::work(const std::stop_token& stop) {
         next = pace.next();
       }
     }
-  } catch (const os::Interrupted&) {  // a signal has set os::interrupted(), which ends every thread
-  } catch (const os::Ended&) {        // the thread was asked to end while it waited on a line without pauses
+    // a signal such as Ctrl-C has set os::interrupted(), at which every thread of the monitor ends
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {  // the thread was asked to end while it waited on a line without pauses
   } catch (const std::exception& error) {
     end(error.what());
   }
@@ -250,7 +251,7 @@ std::string Watch::result_of(Encoder& live, const Command& command) {
       return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
     return fmt::format("{}: {}", command.name, outcome.change.text());
-  } catch (const os::Failure& failure) {  // the port was lost, which the next reading reports
+  } catch (const os::Failure& failure) {  // the port was lost during the command; the next reading reports the loss
     return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
 }

@@ -39,8 +39,8 @@ struct Snapshot {
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;  // number of times that the position started again; see Encoder::restarts
-  double rate = 0;             // measured number of readings per second
-  Time median{};               // median of the latencies from request to reply
+  double rate = 0;             // number of readings per second, as measured
+  Time median{};               // median of the times from a request to the end of its reply
   Time percentile_99{};
   Time longest{};
   // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
@@ -103,10 +103,10 @@ class Watch {
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // the continuous position started again at the previous reading
-  bool command_runs_ = false;  // a command is running, which must not be aborted
+  bool restarted_ = false;     // whether the continuous position started again at the previous reading
+  bool command_runs_ = false;  // whether a command is running, which must not be aborted
 
-  std::jthread thread_;  // must be the last member, because the thread uses all other members
+  std::jthread thread_;  // declared last, because the thread uses all other members of this object
 };
 
 }  // namespace absenc::tool

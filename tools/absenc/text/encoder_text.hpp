@@ -20,7 +20,8 @@ using namespace client;
 /// Returns a failure as the JSON object {"ok":false,"error":...}.
 [[nodiscard]] Json to_json(const Trouble& trouble);
 
-/// Sets the keys that state whether the encoder was changed; sets none for a command that changes no encoder.
+/// Sets the keys of `json` that state whether the command has changed the encoder; sets none if the command changes no
+/// encoder.
 void set_change(Json& json, const Change& change);
 
 /// Returns the finding about a failure as text: "Looks like only_echo: ...; `absenc doctor tformat:/dev/ttyUSB0` says
@@ -35,12 +36,13 @@ void set_change(Json& json, const Change& change);
 /// Returns how often each error occurred, as a JSON object like {"timeout":2}.
 [[nodiscard]] Json errors_to_json(const host::Counters& counters);
 
-/// Sets the keys for position and speed (in rpm or mm/s) with the speed's uncertainty; invalid values are null.
+/// Sets the keys of `json` for position, speed (in rpm or mm/s) and the uncertainty of the speed; an invalid value
+/// becomes null.
 void set_motion(Json& json, const Sample& sample, double unit_um);
-/// Sets the keys for the joint's speed and its uncertainty, null if unknown. Sets nothing if the address has no joint
-/// settings.
+/// Sets the keys of `json` for the joint's speed and its uncertainty; unknown values become null. Sets no keys if the
+/// address has no settings of the joint.
 void set_joint_speed(Json& json, const Sample& sample, const Joint& joint, double unit_um);
-/// Returns the angles that follow from settings in the address, as "   joint 12.3450 deg".
+/// Returns the angles of joint and motor, for which the address has settings, as "   joint 12.3450 deg".
 [[nodiscard]] std::string angles_text(const Joint& joint, const Sample& sample);
 
 }  // namespace absenc::tool

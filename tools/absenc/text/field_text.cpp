@@ -83,7 +83,7 @@ void FieldTable::put_reading(const Reading& reading) {
   std::erase_if(judged_, [&](const ValidatedRow& judged) {
     if (holds(*judged.info, reading)) return false;
     rows[judged.row][1] = marked(*judged.info, rows[judged.row][1], reading);
-    return true;  // true removes the row from the list, so that a later reading does not mark it again
+    return true;  // the row is marked as invalid now, so it leaves `judged_` and a later reading does not mark it again
   });
 }
 

@@ -23,8 +23,8 @@ namespace {
 
 struct Measurement {
   std::vector<Time> latencies;  // latencies of all good readings, the shortest first
-  // The time between the beginnings of two readings, minus the period, for each two readings; the smallest first. Empty
-  // without a rate.
+  // For each two consecutive readings, the time between their beginnings minus the period; the smallest first. Empty if
+  // no rate was given.
   std::vector<Time> deviations;
   Time period{};
   std::uint64_t failed = 0;

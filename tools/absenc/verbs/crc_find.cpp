@@ -40,7 +40,8 @@ std::string hex(std::uint32_t value, unsigned width) { return fmt::format("0x{:0
 // Returns the polynomial in Koopman's notation: with the highest power, without x^0.
 std::string koopman(const CrcParameters& crc) { return hex((1u << crc.width | crc.poly) >> 1, crc.width); }
 
-/// Returns the covered part as text in `unit`, such as "bytes 0 to 7".
+/// Returns the part of the frame that the checksum covers, as text such as "bytes 0 to 7"; `unit` is the word for bytes
+/// or bits.
 std::string covered_text(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
   const std::string end = findings.shortest == findings.longest
                               ? fmt::format("{}", findings.shortest - check.trailing - check.check_size - 1)

@@ -171,7 +171,7 @@ class Survey {
   Rows rows;
   // Text below the rows: alarms in words, why a position is doubtful, and with `all` the reading.
   std::string below;
-  std::vector<Trouble> troubles;  // the first failure for each kind of error
+  std::vector<Trouble> troubles;  // one failure for each kind of error: the first that occurred
 
  private:
   // Adds those of the rows `more` that are not in the table: several commands may report the same value.
@@ -222,8 +222,8 @@ class Survey {
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool all_;
-  bool heard_ = false;          // a reply has reported the resolution
-  std::string failed_setting_;  // reason why the setting that failed last could not be read
+  bool heard_ = false;          // whether a reply has reported the resolution of the encoder
+  std::string failed_setting_;  // error message of the last setting that could not be read
 };
 
 int run_info(const Invocation& invocation) {

@@ -39,7 +39,7 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-// This is the only option in `outlet_parameters` that takes no value.
+// --home-assistant is the only option in `outlet_parameters` that takes no value.
 constexpr std::string_view home_assistant = "--home-assistant";
 
 // An option that sets the same value as a setting in absenc.toml, and the section of that file.

@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// These two times are assumed; the document gives none.
+// The document gives neither an answer time nor a start-up time, so both are assumed.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
@@ -88,8 +88,8 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // Answers of other nodes also have identifier 7E5. An answer without an error equals a setting with value 0, so
-  // outside configuration mode such a frame is ignored.
+  // Identifier 7E5 also carries the answers of other nodes. An answer without an error has the same bytes as a setting
+  // with value 0, so outside configuration mode the node ignores a frame with these bytes.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
@@ -129,7 +129,8 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Stores a setting if its value is known. A new bit rate becomes active after the answer.
+// Stores the value of a setting if the document defines this value. A new bit rate becomes active after the answer to
+// the setting.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

@@ -49,7 +49,8 @@ enum class Function : std::uint8_t {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
 
-/// Returns the node number in an identifier, for purposes whose identifiers have one.
+/// Returns the node number in the identifier of a frame; only for frames of a purpose whose identifiers contain a node
+/// number.
 [[nodiscard]] constexpr std::uint8_t node_of(const CanFrame& frame) {
   const Function function = function_of(frame);
   const bool has_eight_bits = function == Function::reply || function == Function::command;
@@ -58,7 +59,7 @@ enum class Function : std::uint8_t {
 
 /// Names of the CANopen functions that this encoder does not use; empty for the functions that it uses.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
-/// Returns whether the document names a function of CANopen without describing its frames.
+/// Returns whether `function` is a function of CANopen that the document names without describing its frames.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
   return !function_names[static_cast<std::size_t>(function)].empty();
 }
@@ -76,14 +77,14 @@ struct Rate {
 /// All bit rates of the encoder.
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};
 
-/// Returns the bit rate with this index of CiA 305; null if the encoder does not have it.
+/// Returns the bit rate that has this index in the table of CiA 305; null if the encoder does not have the rate.
 [[nodiscard]] constexpr const Rate* rate_of_index(std::uint8_t index) {
   for (const Rate& rate : rates) {
     if (rate.index == index) return &rate;
   }
   return nullptr;
 }
-/// Returns the bit rate with these bits per second; null if the encoder does not have it.
+/// Returns the bit rate of this number of bits per second; null if the encoder does not have the rate.
 [[nodiscard]] constexpr const Rate* rate_of_bits(std::int64_t bits_per_second) {
   for (const Rate& rate : rates) {
     if (rate.bits_per_second == bits_per_second) return &rate;
@@ -111,9 +112,9 @@ struct Format {
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
 };
 
-/// Values of frames and commands. Only members with a value are reported.
+/// Values that a frame contains, or that a command gives as its result. Only members that have a value are reported.
 struct Values {
-  /// A number that may be absent.
+  /// C++ type of the members that are numbers; such a member is empty if it has no value.
   using Number = std::optional<std::int64_t>;
   Number node{};  ///< Number of the node, 1 to 255.
   /// Meaning of the identifier in CANopen, for frames that this encoder does not use.
@@ -127,12 +128,12 @@ struct Values {
   Number readings_per_s{};      ///< Positions per second that the node sends without a request.
   std::optional<std::uint64_t> singleturn{};  ///< Position within one revolution, in counts.
   std::optional<double> angle{};              ///< Position within one revolution, in degrees.
-  std::optional<bool> written{};   ///< True if a setting was written; false if the encoder had this value already.
+  std::optional<bool> written{};  ///< True if the command wrote a setting; false if the encoder had this value already.
   std::optional<bool> answered{};  ///< Whether the node answered the order.
-  /// Whether the order has mirrored the position, because the counting direction has changed.
+  /// Whether order 22 has mirrored the position, because it has changed the counting direction.
   std::optional<bool> mirrored{};
-  std::optional<std::uint64_t> before{};  ///< Position before the order, in counts.
-  std::optional<std::uint64_t> after{};   ///< Position after the order, in counts.
+  std::optional<std::uint64_t> before{};  ///< Position before order 20 (zero) or 22 (direction), in counts.
+  std::optional<std::uint64_t> after{};   ///< Position after order 20 (zero) or 22 (direction), in counts.
 };
 
 // ---- Orders to a node
@@ -154,10 +155,10 @@ struct OrderInfo {
   std::uint8_t value_at = 0;  ///< Index of the data byte that carries the order's value; 0: the order has no value.
   std::uint8_t least = 0;     ///< Lowest value that the order may carry.
   std::uint8_t most = 255;    ///< Highest value that the order may carry.
-  /// Member of Values in which the order's value is reported; null: the value is not reported.
+  /// Member of Values in which the value that the order carries is reported; null: this value is not reported.
   Values::Number Values::*shown = nullptr;
 };
-/// Descriptions of all orders, in the order of the enum.
+/// Descriptions of all orders; the index of a description is the number of its enumerator in `Order`.
 inline constexpr std::array<OrderInfo, 8> orders{{
     {Order::start, 0x01, "start", false, Answer::position},
     {Order::zero, 0x20, "zero", false, Answer::code},

@@ -14,13 +14,14 @@ Read::Read(const Format& format, Mode mode) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // A 29-bit identifier with the number of the reply's identifier may be another device's, but is evidence for the
-  // user.
+  // A frame whose 29-bit identifier has the number of the reply's 11-bit identifier may come from another device. It is
+  // no reply, but the host keeps it as evidence for the user.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // The document does not state when the node latches the position; the end of the request is taken.
+  // The document does not state when the node latches the position. The end of the request is taken as this time, and
+  // without a request the time at which the frame arrived.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,

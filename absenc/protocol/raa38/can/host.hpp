@@ -13,7 +13,7 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// These times are assumed: the document gives no reply times.
+// The document gives no reply times, so the next three times are assumed.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
 /// Time for which the host listens for unsolicited frames whose rate it does not know.
@@ -25,9 +25,9 @@ struct Protocol {
   using Item = CanFrame;
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = can::Format;
-  /// Type of requests to the encoder.
+  /// C++ type of the requests to the encoder.
   using Request = CanFrame;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = CanFrame;
 
   /// Returns how a host sends a frame; all frames are sent in the same manner.
@@ -58,10 +58,10 @@ class Read : public author::CanEngine {
  public:
   /// How the position is obtained: by the read request, by the start request, or by listening.
   enum class Mode : std::uint8_t { ask, start, listen };
-  /// Creates a conversation that reads one position in this mode.
+  /// Creates a conversation that reads one position; `mode` selects how it obtains the position.
   Read(const Format& format, Mode mode);
 
-  /// Returns the format of the encoder.
+  /// Returns the frame layout and settings of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the position that was read; its `singleturn_bits` is 0 as long as none was read.
   [[nodiscard]] const Reading& found() const { return reading_; }
@@ -80,7 +80,7 @@ class Read : public author::CanEngine {
 
 /// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // The order is a constant in each call, so that firmware does not link the table of orders.
+  // Each call of `encode` states its order as a constant, so that firmware does not link the table `orders`.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -131,9 +131,9 @@ struct Nodes {
 /// Finds the nodes on the bus by requesting every number from 1 to 255. Errors: timeout, bad_framing.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of `configure`: the result of the setting, and the nodes that were found on the bus before the setting.
+/// Result of `configure`: the values that it reports, and the nodes that were on the bus before the setting was sent.
 struct ConfigureResult : Values {
-  Nodes nodes{};          ///< Nodes that were found on the bus before the setting.
+  Nodes nodes{};          ///< Nodes that were found on the bus before the setting was sent.
   bool verified = false;  ///< Whether the host has verified that the node obeys the setting.
 };
 

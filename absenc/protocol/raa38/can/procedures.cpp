@@ -93,7 +93,7 @@ struct PositionResult {
 Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // The words of the error are made here, because the next request replaces the exchange that they quote.
+  // The explanation of the error is made here, because it quotes the last exchange, which the next request replaces.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
@@ -139,7 +139,8 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Both positions after the order must be near 0: the first may be the order's late answer, which equals position 32.
+// Both positions that the host reads after order 20 (zero) must be near 0, because the first may be a late answer to
+// the order: this answer equals the position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -151,7 +152,8 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // The tolerance is twice the usual one, because the shaft may have vibrated before and after the order.
+  // The position may differ by twice the angle that a shaft at rest usually may, because the shaft may have vibrated
+  // both before and after order 22.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -186,7 +188,8 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Accepts a rate near the wanted one, because the adapter may deliver frames in bursts.
+// Compares the measured send rate with the rate that order 31 has requested. A small difference is accepted, because
+// the adapter may deliver frames in bursts.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -210,7 +213,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // If the adapter delivers frames late, the first measurement may be wrong and a repeated one right.
+  // If the adapter delivers frames late, the first measurement of the send rate may be wrong and a repeated one right.
   for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const SendRate heard = co_await count_frames(dialog);
@@ -243,7 +246,8 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// If a node's frame arrives more than this number of requests after the request to the node, it is no answer.
+// A node's frame that arrives more than this number of requests after the request to the node does not count as its
+// answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
@@ -327,7 +331,7 @@ Part<bool> wait_until_over(Dialog& dialog) {
   co_return true;
 }
 
-// Writes a setting to the node. If its answer is lost, the node may nevertheless have obeyed.
+// Writes a setting to the node. If the node's answer is lost, the node may nevertheless have obeyed.
 Part<bool> write(Dialog& dialog, ConfigureResult& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
   co_await wait_until_over(dialog);

@@ -44,7 +44,7 @@ inline constexpr std::uint8_t negative = 0x02;  ///< Parameter of function CC th
 inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57'600};
 /// Parameters of function CC that set the baud rates in `bauds`, in the same order.
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
-inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the factory setting.
+inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the baud rate at shipping.
 
 /// Returns the meaning of a parameter of function CC in words, or "unknown".
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
@@ -69,7 +69,8 @@ inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the
 /// Line settings of an encoder as delivered.
 inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
-/// Form of the virtual encoder's reply to a request of two registers; examples in the document have all three.
+/// Form of the virtual encoder's reply to a request of two registers; the document has an example of each of the three
+/// forms.
 enum class Data : std::uint8_t {
   four_bytes,     ///< Reply with byte count 04 and four bytes of data.
   three_bytes,    ///< Reply with byte count 03 and three bytes of data.
@@ -99,7 +100,7 @@ struct Format {
 struct Request {
   std::uint8_t function = function::read;  ///< Function code of the request.
   std::uint8_t address = 1;                ///< Address to which the request is sent.
-  /// Only for set_address: the new address; only for set_parameter: the parameter.
+  /// Only for set_address: the new address; only for set_parameter: the number of the parameter.
   std::uint8_t value = 0;
   std::uint16_t first_register = 0;  ///< Only for the function `read`: the first register to read.
   std::uint16_t registers = 1;       ///< Only for the function `read`: number of registers to read.
@@ -160,8 +161,8 @@ struct Reply {
   std::uint8_t function = function::read;  ///< Function code of the reply.
   std::uint8_t address = 1;                ///< Address of the encoder; in the reply to set_address, the new address.
   std::uint32_t singleturn = 0;            ///< Only for the function `read`: position in counts.
-  std::uint8_t value = 0;                  ///< Only in the reply to the function `set_parameter`: the parameter.
-  CrcOrder order = CrcOrder::low_first;    ///< Byte order of the CRC in the reply.
+  std::uint8_t value = 0;  ///< Number of the parameter that was set; only in the reply to the function `set_parameter`.
+  CrcOrder order = CrcOrder::low_first;  ///< Byte order of the CRC in the reply.
   /// Only for the function `read`: length of the reply in bytes if the CRC cannot prove this length; otherwise 0.
   std::size_t doubtful_size = 0;
 };
@@ -171,7 +172,7 @@ struct Reply {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
-/// Returns whether the length of the first reply stays in doubt after the second one.
+/// Returns whether the length of the reply `first` stays in doubt after the reply `second` to the same request.
 [[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
   return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
 }
@@ -268,9 +269,9 @@ inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
-  /// Type of requests to the encoder.
+  /// C++ type of the requests to the encoder.
   using Request = rtu::Request;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
@@ -286,7 +287,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the probable length in bytes of a reply to `request` of which these first bytes were received.
+  /// Returns the probable length in bytes of the complete reply to `request`; `reply` has the bytes received so far.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
@@ -301,11 +302,12 @@ struct Protocol {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
-  /// Returns `sent_at`, the end of the request: the document does not say when the encoder latches the position.
+  /// Returns `sent_at`, the end of the request, as the time at which the encoder latched the position; the document
+  /// does not state that time.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
-  /// Returns wrong_length if the length is still in doubt after the second reply, otherwise none.
+  /// Returns wrong_length if the length of the first reply is still in doubt after the second reply, otherwise none.
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
   }

@@ -88,7 +88,8 @@ TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, {}).function, function::read);
 }
 
-// A valid frame that ends with a certain CRC may stay valid if a 00 is appended.
+// A valid frame stays valid if a 00 is appended, so the CRC does not prove whether a reply has three or four bytes of
+// data.
 TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));

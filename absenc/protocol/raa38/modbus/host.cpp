@@ -114,8 +114,8 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Tries up to `attempts` times to read the position. Stops the procedure if the position has more bits than the one
-// register that is requested.
+// Tries up to `attempts` times to read the position. Stops the procedure if the host requests only one register (16
+// bits) and the position has more bits.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -139,8 +139,8 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Reads the address with function A0; ends the command if another address than the format's answers. `baud`: present
-// rate of the line.
+// Reads the address with function A0; ends the command if an encoder answers that has another address than the format.
+// `baud`: present rate of the line.
 Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
@@ -169,14 +169,14 @@ Part<Reply> read_own_position(Dialog& dialog, CommandValues& found, unsigned att
   co_return *reply;
 }
 
-// Copies the dialog's last position into `found`.
+// Copies the position in the last reply into `found`.
 void show_position(const Dialog& dialog, CommandValues& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Checks whether the encoder answers with the new address or baud rate, or else with the old one.
+// Checks whether the encoder answers at the new address or baud rate, or else at the old one.
 Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
                              std::string_view at_the_old_one) {
   const Format& format = dialog.format();

@@ -16,7 +16,7 @@ namespace absenc::raa38::rtu {
 /// Returns cause and advice for an error of `request` or `reply`; either may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Values of frames and commands. Only members with a value are reported.
+/// Values that a frame contains, or that a command gives as its result. Only members that have a value are reported.
 struct Values {
   std::optional<std::uint16_t> address{};         ///< Address of the encoder.
   std::optional<std::uint16_t> function{};        ///< Function code of the frame.
@@ -25,7 +25,7 @@ struct Values {
   std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
   std::optional<double> angle{};                  ///< Position within the turn, in degrees.
   std::optional<std::uint16_t> new_address{};     ///< Address that function A1 gives to the encoder.
-  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC in the request or reply.
+  std::optional<std::uint16_t> parameter{};       ///< Number of the parameter of function CC in the request or reply.
   std::optional<std::string_view> setting{};      ///< Meaning of the parameter of function CC in words.
   std::optional<std::string_view> crc_order{};    ///< Byte order of the CRC: low_first or high_first.
   std::optional<std::uint32_t> baud{};            ///< Baud rate at which the encoder answers, in bits per second.

@@ -110,7 +110,7 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 
 // ---- Evidence of captured frames for options; their address does not matter
 
-/// The decoded frames of a capture, or in `wrong` the error that they have whatever the options are.
+/// Request and reply of a capture, decoded. `wrong` states an error of the capture that no option value can explain.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};

@@ -9,7 +9,7 @@ ByteStep VirtualEncoder::next(Time now) {
   if (std::exchange(pending_, false)) return character();
   const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();
   if (streams && now >= due_) {
-    // If the stream is late by more than `most_backlog`, the frames that are due are dropped.
+    // If the stream is late by more than `most_backlog`, the encoder drops the frames that it should have sent by now.
     if (now - due_ > most_backlog) due_ = now;
     transmit(encode_position(format(), position(due_)), due_);
     due_ += format().period() > Time{} ? format().period() : virtual_period;
@@ -64,7 +64,7 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
 // Reports a rule violation if a request `BC AA Bx` for this encoder arrives during its transmission.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
-  // The request may have come in time and have waited until this program was scheduled.
+  // If the event was delivered late, the request may have arrived before the transmission; then it breaks no rule.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
     last_characters_ = (last_characters_ << 8 | byte) & 0xFFFFFF;

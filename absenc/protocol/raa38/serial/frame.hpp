@@ -198,7 +198,7 @@ struct Request {
                  static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
 }
 
-/// Values of frames and commands. Only members with a value are reported.
+/// Values that a frame contains, or that a command gives as its result. Only members that have a value are reported.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};  ///< Scan: number of a unit that answered, 0 to 15.
   /// Scan: true if no answer of the unit was valid, because two encoders have its number or the line is bad.
@@ -213,7 +213,7 @@ struct Values {
   std::optional<std::uint64_t> skipped{};     ///< Number of received bytes that belong to no valid frame.
 };
 
-/// Returns Values with the position in a frame.
+/// Returns the Values that report the position and the second byte of a frame.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
   return {.singleturn = position.singleturn,
           .second_byte = position.second_byte,
@@ -224,9 +224,9 @@ struct Values {
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
-  /// Type of requests to the encoder.
+  /// C++ type of the requests to the encoder.
   using Request = serial::Request;
-  /// Type of the encoder's replies.
+  /// C++ type of the encoder's replies.
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
@@ -278,9 +278,10 @@ struct Protocol {
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
-  /// Returns `sent_at`: the document does not say when the encoder latches the position.
+  /// Returns `sent_at`, the end of the request, as the time at which the encoder latched the position; the document
+  /// does not state that time.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of the virtual encoder.
+  /// Returns the times of the virtual encoder: until its frame, and until it drops an incomplete request.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }

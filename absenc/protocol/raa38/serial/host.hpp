@@ -50,7 +50,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:
-  // Greatest number of results that are not emitted yet, enough for the bytes that a port delivers at once.
+  // Greatest number of stream results that wait to be emitted; it suffices for the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const StreamFrame& found);

@@ -26,7 +26,7 @@ TEST(Raa38SerialHandshake, ReadsOneFramePerPulse) {
   EXPECT_EQ(read.reading->latched, Time{}) << "at the edge";
   EXPECT_EQ(read.took, virtual_acquisition + frame_time) << "T1";
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  // The frame may follow CLK after a time T3 that is shorter than the pulse on CLK.
+  // The encoder may send its frame after a time T3 that is shorter than the host's pulse on CLK.
   EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).run_command("position"), Error::none));
 }
 
@@ -152,7 +152,7 @@ TEST_P(Raa38SerialZero, ReportsZeroWithoutEffect) {
 }
 
 TEST_P(Raa38SerialZero, RefusesWhileShaftTurns) {
-  // The procedure detects even 2 rpm, because time passes between its two readings of the position.
+  // The procedure notices even a shaft that turns at only 2 rpm, because time passes between its two readings.
   for (const int rpm : {60, 2}) {
     Bench bench(GetParam());
     bench.shaft.spin(rpm, Time{});

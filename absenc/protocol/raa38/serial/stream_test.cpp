@@ -187,8 +187,8 @@ TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
 
 struct Tally {
   std::uint64_t sent = 0;
-  std::uint64_t lost = 0;   // sent frames that were not received, although no disturbance hit them
-  std::uint64_t wrong = 0;  // received positions that none of the next 12 sent frames carried
+  std::uint64_t lost = 0;   // number of sent frames that were not received, although no disturbance hit them
+  std::uint64_t wrong = 0;  // number of received positions that none of the next 12 sent frames carried
   std::uint64_t disturbances = 0;
 };
 

@@ -146,7 +146,7 @@ constexpr auto commands = std::array{
 
 // ---- Declaration
 
-// No highest speed is set, because the document gives none.
+// The model states no highest speed of the shaft, because the document gives none.
 constexpr auto models =
     std::array{author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
 

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Host side of a clocked line whose data turns: the host sends bits, then clocks the reply out of the encoder.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/protocol/author/engine.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::author {
+
+/// Bits that a host sends: a request, and for some requests a supplement behind the reply.
+using HostBits = BitBuffer<64>;
+
+/// A request on a bidirectional clocked line, and how the reply is clocked.
+struct BitRequest {
+  HostBits bits{};        ///< Bits of the request, from the first clock on.
+  HostBits supplement{};  ///< Bits that the host sends in the clocks behind a valid reply; empty: none.
+  /// Number of clocks behind the request. With a supplement: as few as a complete reply can need; the host then clocks
+  /// on until the reply is complete.
+  std::size_t clocks = 0;
+  std::size_t late_clocks = 0;  ///< With a supplement: most clocks by which the reply is expected to be later.
+  std::uint32_t rate = 0;       ///< Rate of the clock in Hz.
+  Time rest{};                  ///< Shortest time from the last exchange to this one.
+
+  /// Returns whether there are no bits to send: the request has no encoding.
+  [[nodiscard]] constexpr bool empty() const { return bits.size() == 0; }
+};
+
+/// Conversation on a clocked line whose data turns; a subclass provides the protocol.
+///
+///   | state    | next step                                                              | continues with |
+///   |----------|------------------------------------------------------------------------|-----------------------------|
+///   | ready    | the request, and the first clocks of the reply                         | clocking | | clocking |
+///   none: the received bits are awaited                                    | missing, adding, over       | | missing
+///   | as many clocks as the reply still needs, while the clock rests low     | clocking                    | | adding
+///   | the supplement, or one clock that ends an exchange with a bad reply    | added                       | | added
+///   | none: the end of the supplement is awaited                             | over                        | |
+///   sleeping | none: a time is awaited                                                | ready, over                 |
+///   | ending   | none: the encoder may still execute a request that failed              | over |
+class BitEngine : public Conversation<std::uint8_t> {
+ public:
+  /// Not copyable: requests and replies are views into the conversation itself.
+  BitEngine(const BitEngine&) = delete;
+  BitEngine& operator=(const BitEngine&) = delete;
+
+  /// Handles an event that the port reports.
+  void feed(const Event<std::uint8_t>& event) final;
+  /// Returns the next step that the port must take.
+  Step<std::uint8_t> next(Time now) final;
+  [[nodiscard]] Error error() const final { return error_; }
+  /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
+  void report(FieldSink&) const override {}
+  /// Returns the bits of the last request with its supplement, and those of the reply, as bytes.
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
+    return {sent_bits_.bytes(), Bytes(storage_).first((size_ + 7) / 8), sent_at_, received_at_};
+  }
+
+  /// Returns the time of the first clock edge of the last exchange.
+  [[nodiscard]] Time begun_at() const { return begun_at_; }
+  /// Returns the time at which the last bit of the last request was sent.
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
+  /// Returns the end of the last exchange.
+  [[nodiscard]] Time received_at() const { return received_at_; }
+  /// Returns the bits received last, valid or not.
+  [[nodiscard]] BitView reply() const { return {Bytes(storage_).first((size_ + 7) / 8), size_}; }
+  /// Returns false: an encoder on a clocked line cannot send without a clock.
+  [[nodiscard]] static constexpr bool is_noisy() { return false; }
+
+ protected:
+  /// Constructs an engine. `storage`: room for the longest reply, which must outlive the engine.
+  explicit BitEngine(MutableBytes storage) : storage_(storage) {}
+  ~BitEngine() = default;
+
+  /// Sets that `request` is sent next, not before `earliest`. Of `manner` repetitions, their pause, `holds_line` and
+  /// `expects_reply` hold.
+  void send(const BitRequest& request, const Manner& manner, Time earliest);
+  /// Sets that the caller gets the present result, by the step `emit`.
+  void emit() { emitting_ = true; }
+  /// Sets that nothing is sent until `time`, and that `woken` is called then.
+  void sleep(Time time);
+  /// Sets that the conversation ends with `error`, at the earliest `hold` after `received_at()`.
+  void finish(Error error, Time hold = {});
+  /// Returns the manner of the present request, with the repetitions that are left.
+  [[nodiscard]] const Manner& manner() const { return manner_; }
+
+  /// Returns how many more bits the reply needs to be complete; 0: it is complete, or can never be.
+  [[nodiscard]] virtual std::size_t missing() const = 0;
+  /// Checks the reply in `reply()`, and stores its content if it is valid. Returns the first error.
+  [[nodiscard]] virtual Error check() = 0;
+  /// Handles the end of an exchange. `error` is that of the last attempt, or none.
+  virtual void concluded(Error error) = 0;
+  /// Is called when the time of `sleep` has passed.
+  virtual void woken() {}
+
+ private:
+  enum class State : std::uint8_t { ready, clocking, missing, adding, added, sleeping, ending, over };
+
+  [[nodiscard]] bool goes_on() const { return request_.supplement.size() != 0; }
+  void begin_transfer(Step<std::uint8_t>& step, Time now);
+  void received(const Event<std::uint8_t>& event);
+  void append(BitView bits);
+  void conclude_with(Error error);
+
+  State state_ = State::over;
+  bool started_ = false;
+  bool emitting_ = false;
+  Error error_ = Error::none;
+  Error reply_error_ = Error::none;  // error of the reply before the supplement
+  std::size_t size_ = 0;             // number of bits of the reply
+  std::size_t awaited_ = 0;          // number of bits that the present transfer delivers
+  MutableBytes storage_;
+  Manner manner_{};
+  BitRequest request_{};
+  HostBits sent_bits_{};  // request, and the supplement if it was sent
+  HostBits out_{};        // bits of the present transfer
+  Time earliest_{};
+  Time begun_at_{};
+  Time sent_at_{};
+  Time received_at_{};
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// A conversation that reads the position of an EnDat encoder; it uses no port, clock, heap or texts.
+#pragma once
+
+#include <algorithm>
+#include <new>
+
+#include "absenc/protocol/endat/protocol.hpp"
+
+namespace absenc::endat {
+
+/// Removes additional information that the format does not ask for, and returns the reading of the reply without it:
+/// another host may have selected it, and ends it as it likes.
+constexpr Reading drop_unasked(const Format& format, Code code, Reply& reply) {
+  reply.info_count = static_cast<std::uint8_t>(std::min<std::size_t>(reply.info_count, format.infos()));
+  return reading_of(format, code, reply);
+}
+
+/// Conversation that reads the position and, if an error or a warning is set, the alarms.
+class ReadPosition : public author::HostOf<Protocol> {
+ public:
+  /// Reads from an encoder of this format with `request`, which has a position.
+  ReadPosition(const Format& format, const Request& request) : HostOf(format), position_request_(request) {
+    ask(request);
+  }
+  [[nodiscard]] const Reading* reading() const final { return has_reading_ ? &reading_ : nullptr; }
+  /// Returns the request for the position, even if the alarms were read behind it.
+  [[nodiscard]] const Request& request() const { return position_request_; }
+  /// Returns the valid reply to the request for the position, with the alarms that were read.
+  [[nodiscard]] const Reply& last() const { return reply_; }
+
+ private:
+  enum class Step : std::uint8_t { position, area, errors, warnings };
+
+  void concluded(Error error) final {
+    if (error != Error::none) return finish(error, manner().hold);
+    switch (step_) {
+      case Step::position:
+        reply_ = HostOf::last();
+        new (&reading_) Reading(drop_unasked(format(), position_request_.code, reply_));  // saves a copy
+        reading_.latched = begun_at();
+        reading_.received = received_at();
+        if (reading_.alarms == 0) break;
+        step_ = Step::area;
+        return ask({.code = Code::select, .byte = area::status});
+      case Step::area:
+        step_ = Step::errors;
+        return ask({.code = Code::read, .byte = error_word.address});
+      case Step::errors:
+        errors_ = HostOf::last().word;
+        step_ = Step::warnings;
+        return ask({.code = Code::read, .byte = warning_word.address});
+      case Step::warnings:
+        add_alarms(reading_, errors_, HostOf::last().word);
+        reply_.alarms_read = static_cast<std::uint16_t>(reading_.alarms);
+        break;
+    }
+    has_reading_ = true;
+    finish(Error::none);
+  }
+
+  Request position_request_;
+  Step step_ = Step::position;
+  bool has_reading_ = false;
+  std::uint16_t errors_ = 0;
+  Reply reply_{};
+  Reading reading_{};
+};
+
+}  // namespace absenc::endat

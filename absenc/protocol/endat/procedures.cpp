@@ -1,0 +1,623 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/endat/procedures.hpp"
+
+#include <bit>
+
+#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/endat/host.hpp"
+
+namespace absenc::endat {
+
+using namespace author;
+
+namespace {
+
+Code position_code(const Format& format) { return format.version == Version::v21 ? Code::position : Code::position_22; }
+
+// ---- Words of the memory by commands of EnDat 2.1
+
+// Selects an area, unless `selected` has its MRS code, which is the last one that this procedure selected.
+Part<bool> select(Dialog& dialog, std::uint8_t& selected, std::uint8_t mrs, std::string_view step) {
+  if (selected == mrs) co_return true;
+  const Result<Reply> reply = co_await dialog.attempt({.code = Code::select, .byte = mrs});
+  if (reply.error() == Error::request_rejected) {
+    co_await dialog.stop({Error::unsupported, "the encoder does not have this memory area"});
+  }
+  if (!reply) co_await dialog.stop({reply.error(), step});
+  selected = mrs;
+  co_return true;
+}
+
+Part<std::uint16_t> read_word_21(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
+  co_await select(dialog, selected, word.mrs, step);
+  const Reply reply = co_await dialog.ask({.code = Code::read, .byte = word.address}).or_say(step);
+  co_return reply.word;
+}
+
+// ---- Words of the memory by commands of EnDat 2.2
+
+// Additional informations that the encoder sent when a procedure began: their MRS codes, 0 if there was none.
+struct Selection {
+  std::uint8_t info1 = 0;
+  std::uint8_t info2 = 0;
+
+  friend bool operator==(const Selection&, const Selection&) = default;
+};
+
+std::uint8_t code_of(const Info* info) { return info == nullptr ? 0 : static_cast<std::uint8_t>(0x40 | info->number); }
+
+// Finds out which informations are selected: a supplement would collide with one that the host does not know of. Two
+// positions in a row must agree, because ones behind the position, as a damaged line gives them, mean none.
+Part<Selection> find_selection(Dialog& dialog) {
+  Selection found;
+  for (bool first = true;; first = false) {
+    const Reply reply = co_await dialog.ask({.code = Code::position_22, .seeks_infos = true});
+    const Selection now{code_of(reply.info(1)), code_of(reply.info(2))};
+    if (!first && now == found) break;
+    found = now;
+  }
+  Format format = dialog.format();
+  format.info1 = found.info1;
+  format.info2 = found.info2;
+  dialog.set_format(format);
+  co_return found;
+}
+
+// Selects a memory area or, with an MRS code from 40 to 5F, an additional information.
+Part<bool> select_22(Dialog& dialog, std::uint8_t mrs, std::string_view step) {
+  co_await dialog.ask({.code = Code::select_22, .byte = mrs}).or_say(step);
+  Format format = dialog.format();
+  constexpr std::uint8_t stop = 0x0F;
+  if (mrs >> 4 == 4) format.info1 = (mrs & 0x0F) == stop ? 0 : mrs;
+  if (mrs >> 4 == 5) format.info2 = (mrs & 0x0F) == stop ? 0 : mrs;
+  dialog.set_format(format);
+  co_return true;
+}
+
+// Selects what was selected when the procedure began.
+Part<bool> restore(Dialog& dialog, Selection before) {
+  constexpr std::string_view step = "it was done, but the additional information from before is not selected again";
+  if (dialog.format().info1 != before.info1) {
+    co_await select_22(dialog, before.info1 != 0 ? before.info1 : std::uint8_t{mrs::stop_info_1}, step);
+  }
+  if (dialog.format().info2 != before.info2) {
+    co_await select_22(dialog, before.info2 != 0 ? before.info2 : std::uint8_t{mrs::stop_info_2}, step);
+  }
+  co_return true;
+}
+
+// Reads a position until the encoder is no longer busy with its memory. Returns additional information 1.
+Part<Info> wait_until_ready(Dialog& dialog, std::string_view step) {
+  const Time limit = dialog.received_at() + memory_access_time;
+  for (;;) {
+    const Reply reply = co_await dialog.ask({.code = Code::position_22}).or_say(step);
+    const Info* const info = reply.info(1);
+    if (info == nullptr) co_await dialog.stop({Error::unexpected_reply, "the encoder sends no additional information"});
+    if (!info->busy) co_return *info;
+    if (dialog.received_at() > limit) co_await dialog.stop({Error::busy, step});
+  }
+}
+
+// Reads additional information 1 with the MRS code `wanted`.
+Part<std::uint16_t> read_info_1(Dialog& dialog, std::uint8_t wanted, std::string_view step) {
+  co_await select_22(dialog, wanted, step);
+  const Info info = co_await wait_until_ready(dialog, step);
+  if (info.number != (wanted & 0x1F)) {
+    co_await dialog.stop({Error::request_rejected, "the encoder does not have this additional information"});
+  }
+  co_return info.content;
+}
+
+// Selects a memory area and verifies by the acknowledgement that the encoder has it.
+Part<bool> select_area_22(Dialog& dialog, std::uint8_t area, std::string_view step) {
+  co_await select_22(dialog, mrs::nothing, step);
+  co_await select_22(dialog, area, step);
+  const std::uint16_t acknowledged = co_await read_info_1(dialog, mrs::acknowledge_mrs, step);
+  if (acknowledged >> 8 != area)
+    co_await dialog.stop({Error::unsupported, "the encoder does not have this memory area"});
+  co_return true;
+}
+
+Part<std::uint16_t> read_word_22(Dialog& dialog, std::uint8_t address, std::string_view step) {
+  co_await dialog.ask({.code = Code::read_22, .byte = address}).or_say(step);
+  const std::uint16_t low = co_await read_info_1(dialog, mrs::memory_low, step);
+  const std::uint16_t high = co_await read_info_1(dialog, mrs::memory_high, step);
+  if (low >> 8 != address || high >> 8 != address) {
+    co_await dialog.stop({Error::request_rejected, "the encoder acknowledged another address"});
+  }
+  co_return static_cast<std::uint16_t>((high & 0xFF) << 8 | (low & 0xFF));
+}
+
+// ---- Resolution
+
+// The highest position of a single bit, or no bits for a number that is no power of two.
+unsigned bits_of_power(std::uint32_t number) {
+  return std::has_single_bit(number) ? static_cast<unsigned>(std::countr_zero(number)) : 0;
+}
+
+std::uint32_t joined(std::uint16_t low, std::uint16_t high) { return std::uint32_t{high} << 16 | low; }
+
+// Asks the encoder for its resolution, if the options do not state it.
+Part<bool> know_resolution(Dialog& dialog) {
+  if (dialog.format().is_known()) co_return true;
+  constexpr std::string_view step = "the encoder's parameters could not be read";
+  std::uint8_t selected = 0;
+  const std::uint16_t count = co_await read_word_21(dialog, selected, clock_count_word, step);
+  const std::uint16_t type = co_await read_word_21(dialog, selected, type_word, step);
+  const std::uint16_t revolutions = co_await read_word_21(dialog, selected, revolutions_word, step);
+  const std::uint16_t steps_low = co_await read_word_21(dialog, selected, steps_word, step);
+  const std::uint16_t steps_high = co_await read_word_21(dialog, selected, steps_high_word, step);
+  const std::uint32_t steps = joined(steps_low, steps_high);
+  Format format = dialog.format();
+  const unsigned bits = count & 0x3F;
+  if ((type & rotary_type) == 0) {
+    format.position_bits = static_cast<std::uint8_t>(bits);
+    format.unit_pm = std::int64_t{steps} * 1000;
+  } else {
+    format.multiturn_bits = static_cast<std::uint8_t>(bits_of_power(revolutions));
+    format.singleturn_bits = static_cast<std::uint8_t>(bits_of_power(steps));
+  }
+  if (!format.is_known() || bits > most_bits) {
+    co_await dialog.stop({Error::unsupported, "the encoder's measuring steps are no power of two",
+                          "set the options singleturn_bits and multiturn_bits, or position_bits and unit_um"});
+  }
+  if (format.bits() != bits) {
+    co_await dialog.stop({Error::cross_check_failed,
+                          "the encoder's steps and revolutions do not give the number of bits that it states",
+                          "set the options singleturn_bits and multiturn_bits"});
+  }
+  dialog.set_format(format);
+  co_await dialog.rest(long_recovery);
+  co_return true;
+}
+
+Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
+  Reply reply = co_await dialog.ask({.code = position_code(dialog.format())});
+  found.reading = drop_unasked(dialog.format(), dialog.request().code, reply);
+  found.reading.latched = dialog.begun_at();
+  found.reading.received = dialog.received_at();
+  static_cast<Values&>(found) = values_of(dialog.format(), dialog.request(), reply);
+  co_return found.reading;
+}
+
+// Reads error messages and warnings, and adds them to `found`.
+Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
+  std::uint8_t selected = 0;
+  const std::uint16_t errors = co_await read_word_21(dialog, selected, error_word, "");
+  const std::uint16_t warnings = co_await read_word_21(dialog, selected, warning_word, "");
+  co_await dialog.rest(long_recovery);
+  add_alarms(found.reading, errors, warnings);
+  found.alarms = static_cast<std::uint16_t>(found.reading.alarms);
+  found.command.reset();  // the values are of several exchanges
+  found.start.reset();
+  co_return found.reading.alarms;
+}
+
+}  // namespace
+
+// ---- Position, status, parameters
+
+Procedure read_position(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  const Reading reading = co_await look(dialog, found);
+  if (reading.alarms != 0) co_await read_alarms(dialog, found);
+  co_return done;
+}
+
+Procedure read_status(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  co_await look(dialog, found);
+  co_await read_alarms(dialog, found);
+  co_return done;
+}
+
+Procedure clear_alarms(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  std::uint8_t selected = 0;
+  co_await select(dialog, selected, area::status, "nothing was cleared");
+  for (const WordPlace word : {error_word, warning_word}) {
+    // If the reply is lost, the alarms that are read afterwards show whether they were cleared.
+    static_cast<void>(co_await dialog.attempt({.code = Code::write, .byte = word.address, .word = 0}).changes());
+  }
+  co_await dialog.rest(memory_access_time);
+  co_await look(dialog, found);
+  const std::uint32_t alarms = co_await read_alarms(dialog, found);
+  if (alarms != 0) {
+    co_return {Error::cross_check_failed, "alarms remain", "mend the cause that `absenc alarms` names, then try again"};
+  }
+  co_return done;
+}
+
+namespace {
+
+std::string_view kind_of(std::uint16_t type) {
+  switch (type >> 8) {
+    case 0x40:
+      return "linear, absolute";
+    case 0x60:
+      return "linear, absolute, cyclic";
+    case 0x10:
+      return "linear, incremental, distance-coded reference marks";
+    case 0x00:
+      return "linear, incremental";
+    case 0x20:
+    case 0x30:
+      return "linear, with battery";
+    case 0xC0:
+      return "rotary, single-turn";
+    case 0xE0:
+      return "rotary, multi-turn with gears";
+    case 0xD0:
+      return "rotary, multi-turn with battery";
+    case 0x80:
+    case 0x90:
+      return "rotary, incremental";
+    default:
+      return "of a kind that no source names";
+  }
+}
+
+// Reads `count` words and appends them to the words of `found`, the low byte of each first.
+Part<bool> append_words(Dialog& dialog, std::uint8_t& selected, ProcedureResult& found, WordPlace first,
+                        std::uint8_t count) {
+  for (std::uint8_t i = 0; i < count; ++i) {
+    const std::uint16_t word =
+        co_await read_word_21(dialog, selected, {first.mrs, static_cast<std::uint8_t>(first.address + i)}, "");
+    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word)));
+    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word >> 8)));
+  }
+  co_return true;
+}
+
+}  // namespace
+
+Procedure read_info(Dialog& dialog, ProcedureResult& found) {
+  std::uint8_t selected = 0;
+  const std::uint16_t count = co_await read_word_21(dialog, selected, clock_count_word, "");
+  const std::uint16_t type = co_await read_word_21(dialog, selected, type_word, "");
+  const std::uint16_t periods_low = co_await read_word_21(dialog, selected, periods_word, "");
+  const std::uint16_t periods_high = co_await read_word_21(dialog, selected, periods_high_word, "");
+  const std::uint16_t revolutions = co_await read_word_21(dialog, selected, revolutions_word, "");
+  const std::uint16_t steps_low = co_await read_word_21(dialog, selected, steps_word, "");
+  const std::uint16_t steps_high = co_await read_word_21(dialog, selected, steps_high_word, "");
+  co_await append_words(dialog, selected, found, id_words, 3);
+  co_await append_words(dialog, selected, found, serial_words, 3);
+  const std::uint16_t set = co_await read_word_21(dialog, selected, command_set_word, "");
+  co_await dialog.rest(long_recovery);
+  found.bits = static_cast<std::uint8_t>(count & 0x3F);
+  found.type = type;
+  found.kind = kind_of(type);
+  found.periods = joined(periods_low, periods_high);
+  found.revolutions = revolutions;
+  found.steps = joined(steps_low, steps_high);
+  found.speaks_22 = (set & 3) == 1;
+  found.id = found.words.view().first(6);
+  found.serial = found.words.view().subspan(6, 6);
+  const Format& format = dialog.format();
+  if (format.is_known() && format.bits() != *found.bits) {
+    co_return {Error::cross_check_failed, "the encoder states another number of bits than the options",
+               "leave out singleturn_bits and multiturn_bits: they are then asked from the encoder"};
+  }
+  co_return done;
+}
+
+// ---- Memory
+
+namespace {
+
+Part<std::uint16_t> read_any_word(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
+  if (dialog.format().version == Version::v21) co_return co_await read_word_21(dialog, selected, word, step);
+  if (selected != word.mrs) co_await select_area_22(dialog, word.mrs, step);
+  selected = word.mrs;
+  co_return co_await read_word_22(dialog, word.address, step);
+}
+
+// Prepares for accesses to the memory: EnDat 2.2 needs to know what is selected, and the length of a position.
+Part<Selection> begin_access(Dialog& dialog) {
+  if (dialog.format().version == Version::v21) co_return Selection{};
+  co_await know_resolution(dialog);
+  co_return co_await find_selection(dialog);
+}
+Part<bool> end_access(Dialog& dialog, Selection before) {
+  if (dialog.format().version == Version::v22) co_await restore(dialog, before);
+  co_await dialog.rest(long_recovery);
+  co_return true;
+}
+
+constexpr std::string_view no_such_word = "the memory has no such word: `absenc list endat` shows the areas";
+
+}  // namespace
+
+Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
+  const auto mrs = static_cast<std::uint8_t>(arguments[0]);
+  const auto first = static_cast<std::uint8_t>(arguments[1]);
+  const std::int64_t count = arguments[2];
+  const MemoryArea* const area = find_word(mrs, first);
+  if (area == nullptr || arguments[1] + count > area->first + area->count) {
+    co_return {Error::invalid_argument, no_such_word};
+  }
+  const Selection before = co_await begin_access(dialog);
+  std::uint8_t selected = 0;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const WordPlace place{mrs, static_cast<std::uint8_t>(first + i)};
+    const std::uint16_t word = co_await read_any_word(dialog, selected, place, "");
+    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word)));
+    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word >> 8)));
+    if (i == 0) found.value = word;
+  }
+  co_await end_access(dialog, before);
+  found.area = mrs;
+  found.address = first;
+  if (count > 1) found.data = found.words.view();
+  co_return done;
+}
+
+namespace {
+
+// Writes a word and verifies it by reading it back; does nothing if the encoder has the value already.
+Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::uint16_t value) {
+  const std::uint16_t before = co_await read_any_word(dialog, selected, place, "nothing was written");
+  if (before == value) co_return false;
+  const bool by_22 = dialog.format().version == Version::v22;
+  const Request request{.code = by_22 ? Code::write_22 : Code::write, .byte = place.address, .word = value};
+  // If the reply to the write is lost, reading the word back shows whether it was written.
+  const Result<Reply> written = co_await dialog.attempt(request).changes();
+  if (written.error() == Error::request_rejected) {
+    dialog.refused();
+    co_await dialog.stop(
+        {Error::request_rejected, "the encoder refuses to write this word: it may be write-protected"});
+  }
+  if (by_22) {
+    co_await wait_until_ready(dialog, "the word was written, but could not be read back");
+  } else {
+    co_await dialog.rest(memory_access_time);
+  }
+  const std::uint16_t now =
+      co_await read_any_word(dialog, selected, place, "the word was written, but could not be read back");
+  if (now == value) co_return true;
+  if (now == before) dialog.refused();
+  co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
+                        "look at what is there with `absenc memory read` before you write it again"});
+  co_return false;
+}
+
+}  // namespace
+
+Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
+  const WordPlace place{static_cast<std::uint8_t>(arguments[0]), static_cast<std::uint8_t>(arguments[1])};
+  const MemoryArea* const area = find_word(place.mrs, static_cast<unsigned>(arguments[1]));
+  if (area == nullptr) co_return {Error::invalid_argument, no_such_word};
+  if (!area->writable) {
+    co_return {Error::invalid_argument, "this area belongs to the encoder's maker and is write-protected"};
+  }
+  found.area = place.mrs;
+  found.address = place.address;
+  found.value = static_cast<std::uint16_t>(arguments[2]);
+  const Selection before = co_await begin_access(dialog);
+  std::uint8_t selected = 0;
+  found.written = co_await store(dialog, selected, place, *found.value);
+  co_await end_access(dialog, before);
+  co_return done;
+}
+
+// ---- Resets, zero, recovery time
+
+Procedure reset(Dialog& dialog, ProcedureResult& found) {
+  static_cast<void>(co_await dialog.ask({.code = Code::reset}).changes());
+  co_await dialog.rest(reset_time);
+  // A reset ends the selection of additional information.
+  Format format = dialog.format();
+  format.info1 = format.info2 = 0;
+  dialog.set_format(format);
+  co_await know_resolution(dialog);
+  co_await look(dialog, found);
+  co_return done;
+}
+
+Procedure reset_errors(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  co_await find_selection(dialog);
+  static_cast<void>(co_await dialog.ask({.code = Code::error_reset_22}).changes());
+  Format format = dialog.format();
+  format.info1 = format.info2 = 0;
+  dialog.set_format(format);
+  co_await dialog.rest(memory_access_time);
+  co_await look(dialog, found);
+  if (has_error(Code::position_22, dialog.last())) {
+    co_return {Error::cross_check_failed, "an error remains",
+               "`absenc run ... status` names it, then `absenc clear-alarms`"};
+  }
+  co_return done;
+}
+
+namespace {
+
+// Counts of a signal period of the position: 0 if the encoder does not tell a whole number.
+Part<std::uint64_t> counts_of_period(Dialog& dialog, std::uint8_t& selected) {
+  const std::uint16_t low = co_await read_word_21(dialog, selected, periods_word, "nothing was changed");
+  const std::uint16_t high = co_await read_word_21(dialog, selected, periods_high_word, "nothing was changed");
+  const std::uint64_t periods = joined(low, high);
+  const Format& format = dialog.format();
+  if (periods == 0) co_return 0;
+  // A linear encoder states the length of a signal period in nm.
+  if (format.is_linear()) {
+    const auto unit = static_cast<std::uint64_t>(format.unit_pm);
+    co_return unit == 0 || periods * 1000 % unit != 0 ? 0 : periods * 1000 / unit;
+  }
+  const std::uint64_t counts = std::uint64_t{1} << format.singleturn_bits;
+  co_return counts % periods == 0 ? counts / periods : 0;
+}
+
+// Whether a position is at most `distance` counts away from 0.
+bool is_within(std::uint64_t counts, unsigned bits, std::uint64_t distance) {
+  const std::int64_t away = wrapped_difference(counts, 0, bits);
+  return static_cast<std::uint64_t>(away < 0 ? -away : away) <= distance;
+}
+
+}  // namespace
+
+Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  const Reading first = co_await look(dialog, found);
+  co_await dialog.rest(between_looks);
+  const Reading second = co_await look(dialog, found);
+  const Outcome why_not = objection_to_zero(first, second);
+  if (why_not.error != Error::none) co_return why_not;
+  std::uint8_t selected = 0;
+  const std::uint64_t period = co_await counts_of_period(dialog, selected);
+  if (period == 0) {
+    co_return {Error::unsupported,
+               "the encoder states no signal period, in which its datum shift is counted; nothing was changed"};
+  }
+  const std::uint16_t low = co_await read_word_21(dialog, selected, shift_word, "nothing was changed");
+  const std::uint16_t high = co_await read_word_21(dialog, selected, shift_high_word, "nothing was changed");
+  // Rounded to the nearest signal period, so the new position may be up to half a period away from 0.
+  const auto by = static_cast<std::uint32_t>((second.singleturn + period / 2) / period);
+  const std::uint32_t before = joined(low, high);
+  const std::uint32_t wanted = dialog.format().datum_shift == DatumShift::subtracted ? before + by : before - by;
+  const std::array<WordPlace, 2> places{shift_word, shift_high_word};
+  const std::array<std::uint16_t, 2> values{static_cast<std::uint16_t>(wanted),
+                                            static_cast<std::uint16_t>(wanted >> 16)};
+  co_await select(dialog, selected, area::operating, "nothing was changed");
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Request request{.code = Code::write, .byte = places[i].address, .word = values[i]};
+    const Result<Reply> reply = co_await dialog.attempt(request).changes();
+    if (reply.error() == Error::request_rejected) {
+      co_return {Error::request_rejected,
+                 "the encoder refuses another datum shift: its operating parameters may be write-protected"};
+    }
+    co_await dialog.rest(memory_access_time);
+    const std::uint16_t now =
+        co_await read_word_21(dialog, selected, places[i], "the datum shift was written, but could not be read back");
+    if (now != values[i]) {
+      co_return {Error::cross_check_failed, "the encoder has another datum shift than was written",
+                 "read words 0 and 1 of area 0xA7 with `absenc memory read`"};
+    }
+  }
+  static_cast<void>(
+      co_await dialog.ask({.code = Code::reset}).or_say("the datum shift is stored and holds after the next start"));
+  co_await dialog.rest(reset_time);
+  Format format = dialog.format();
+  format.info1 = format.info2 = 0;
+  dialog.set_format(format);
+  const Reading now = co_await look(dialog, found);
+  found.datum_shift = static_cast<std::int32_t>(wanted);
+  found.command.reset();
+  const bool is_zero = is_near(now.singleturn, 0, now.singleturn_bits, zero_millidegrees) ||
+                       is_within(now.singleturn, now.singleturn_bits, period);
+  if (!is_zero) {
+    co_return {Error::cross_check_failed, "the datum shift is stored, but the position is not zero",
+               "hold the shaft still; if it stays so, try the other value of the option datum_shift"};
+  }
+  co_return done;
+}
+
+Procedure read_recovery(Dialog& dialog, ProcedureResult& found) {
+  std::uint8_t selected = 0;
+  const std::uint16_t word = co_await read_word_21(dialog, selected, initialisation_word, "");
+  co_await dialog.rest(long_recovery);
+  found.recovery = (word & recovery_mask) == short_recovery_bits ? 1 : 0;
+  co_return done;
+}
+
+Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
+  std::uint8_t selected = 0;
+  const std::uint16_t before = co_await read_word_21(dialog, selected, initialisation_word, "nothing was changed");
+  const std::uint16_t bits = arguments[0] == 0 ? long_recovery_bits : short_recovery_bits;
+  const auto wanted = static_cast<std::uint16_t>((before & ~recovery_mask) | bits);
+  found.recovery = static_cast<std::uint8_t>(arguments[0]);
+  found.written = wanted != before;
+  if (wanted == before) {
+    co_await dialog.rest(long_recovery);
+    co_return done;
+  }
+  const Request request{.code = Code::write, .byte = initialisation_word.address, .word = wanted};
+  // If the reply to the write is lost, reading the word back shows whether it was written.
+  static_cast<void>(co_await dialog.attempt(request).changes());
+  co_await dialog.rest(memory_access_time);
+  const std::uint16_t now = co_await read_word_21(dialog, selected, initialisation_word,
+                                                  "the recovery time was written, but could not be read back");
+  co_await dialog.rest(long_recovery);
+  if (now == wanted) co_return done;
+  if (now == before) dialog.refused();
+  co_return {Error::cross_check_failed, "the encoder has another recovery time than was written",
+             "look at `absenc config get ... recovery` before you write it again"};
+}
+
+// ---- Additional information
+
+Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
+  co_await know_resolution(dialog);
+  const Selection before = co_await find_selection(dialog);
+  for (const std::int64_t code : arguments) {
+    if (code != 0) co_await select_22(dialog, static_cast<std::uint8_t>(code), "the information could not be selected");
+    co_await find_selection(dialog);
+  }
+  co_await look(dialog, found);
+  const bool has_first = arguments[0] == 0 || arguments[0] == mrs::stop_info_1 || found.info1_code == arguments[0];
+  const bool has_second = arguments[1] == 0 || arguments[1] == mrs::stop_info_2 || found.info2_code == arguments[1];
+  const bool has_both = has_first && has_second;
+  const Reading reading = found.reading;
+  co_await restore(dialog, before);
+  found.reading = reading;
+  if (!has_both) co_return {Error::request_rejected, "the encoder does not have this additional information"};
+  co_return done;
+}
+
+Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  const Selection before = co_await find_selection(dialog);
+  co_await select_22(dialog, mrs::nothing, "");
+  const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
+  co_await restore(dialog, before);
+  found.temperature = (static_cast<double>(tenths) * 10 - 27'315) / 100;
+  co_return done;
+}
+
+// ---- Delay of the line
+
+namespace {
+
+// Clocks before the start bit at this rate of the clock; 0 if three positions do not agree.
+Part<std::size_t> clocks_at(Dialog& dialog, std::uint16_t khz) {
+  Format format = dialog.format();
+  format.clock_khz = khz;
+  dialog.set_format(format);
+  std::size_t first = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Reply reply = co_await dialog.ask({.code = position_code(dialog.format()), .seeks_infos = true});
+    if (i > 0 && reply.start != first) co_return 0;
+    first = reply.start;
+  }
+  co_return first;
+}
+
+}  // namespace
+
+// At a clock so slow that the position is ready behind the mode command, the start bit comes with clock 11. The delay
+// moves it by a clock as soon as it is longer than half a period: the slowest clock at which it does is searched.
+Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
+  co_await know_resolution(dialog);
+  const Format given = dialog.format();
+  constexpr std::size_t earliest = command_bits + turn_bits;
+  auto low = static_cast<std::uint16_t>(slowest / 1000);
+  // Above this rate the start bit may be late because the position is still being calculated.
+  const std::int64_t limit = static_cast<std::int64_t>(earliest) * 1'000'000 / given.latency.count();
+  auto high = static_cast<std::uint16_t>(std::clamp<std::int64_t>(limit, low, given.clock_khz));
+  if (co_await clocks_at(dialog, low) != earliest) {
+    dialog.set_format(given);
+    co_return {Error::unsupported,
+               "the start bit is late even at 100 kHz: the position takes too long to be calculated"};
+  }
+  if (high > low && co_await clocks_at(dialog, high) == earliest) low = high;
+  while (high - low > low / 50 + 1) {
+    const auto middle = static_cast<std::uint16_t>((low + high) / 2);
+    const std::size_t clocks = co_await clocks_at(dialog, middle);
+    (clocks == earliest ? low : high) = middle;
+  }
+  dialog.set_format(given);
+  found.line_delay = 500'000u / high;
+  co_return done;
+}
+
+}  // namespace absenc::endat
