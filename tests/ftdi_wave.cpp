@@ -31,7 +31,11 @@ int run(const std::string& what, const char* name, int count, const char* path) 
   std::vector<std::byte> storage(unit.host_storage);
   for (int i = 0; i < count; ++i) {
     const auto host = unit.host(address.options, *command, {}, storage);
-    if (!host::drive(*host.bytes, port, [] { return true; }) || host.bytes->error() != Error::none) return 1;
+    if (!host::drive(*host.bytes, port, [] { return true; })) return 1;
+    if (const Error error = host.bytes->error(); error != Error::none) {
+      std::fprintf(stderr, "%s\n", std::string(text_of(error).description).c_str());
+      return 1;
+    }
   }
   wires.pass(os::now() + std::chrono::milliseconds(1));
   std::ofstream file(path);
