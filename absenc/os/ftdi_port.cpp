@@ -114,7 +114,7 @@ std::uint8_t FtdiPort::rest() const {
   return static_cast<std::uint8_t>(MpssePin::select | (high && !swapped ? MpssePin::clock : 0));
 }
 
-void FtdiPort::exchange(const ByteStep& step, Received& received) {
+void FtdiPort::exchange(const ByteStep& step, TransferResult& received) {
   commands_.clear();
   if (step.hold_low) {
     hold_low(step.at);
@@ -148,7 +148,7 @@ void FtdiPort::hold_low(Time until) {
 // may end its frame after one and a half periods, so a line without idle clocks gets one command of whole bytes, with
 // up to seven more clocks than needed. SSI has idle clocks; its encoders wait for more than 10 us, and some send the
 // word again if there are more clocks.
-void FtdiPort::clock_in(const ByteStep& step, Received& received) {
+void FtdiPort::clock_in(const ByteStep& step, TransferResult& received) {
   const std::size_t needed = settings_.idle_clocks + step.bits;
   const std::size_t clocks = needed <= 8 || settings_.idle_clocks > 0 ? needed : (needed + 7) / 8 * 8;
   if (step.bits > 0) commands_.shift_in(clocks, idles_high(settings_.spi_mode));
@@ -164,7 +164,7 @@ void FtdiPort::clock_in(const ByteStep& step, Received& received) {
 // set by hand, then each pulse is a rising and a falling edge. The encoder's bits come in by the same pulses, sampled
 // at the rising edge, which is a period after the edge that changed them; the last two are read by hand, so that the
 // clock ends high without another edge.
-void FtdiPort::turn(const ByteStep& step, Received& received) {
+void FtdiPort::turn(const ByteStep& step, TransferResult& received) {
   constexpr std::uint8_t low = MpssePin::select;
   constexpr std::uint8_t high = MpssePin::select | MpssePin::clock;
   constexpr std::uint8_t driving = MpssePin::direction;
@@ -215,7 +215,7 @@ void FtdiPort::turn(const ByteStep& step, Received& received) {
   received.idle_low = false;
 }
 
-void FtdiPort::exchange_bytes(const ByteStep& step, Received& received) {
+void FtdiPort::exchange_bytes(const ByteStep& step, TransferResult& received) {
   std::vector<std::uint8_t> out(step.out.begin(), step.out.end());
   out.resize(std::max(step.out.size(), step.expect), 0);
   const auto selected = static_cast<std::uint8_t>(rest() ^ MpssePin::select);
@@ -238,7 +238,7 @@ void FtdiPort::pause(Time least, std::uint8_t levels) {
   for (Time made{}; made < std::min(least, longest_pause); made += least_command_time) commands_.set_pins(levels);
 }
 
-void FtdiPort::send(std::size_t clocks, Received* received) {
+void FtdiPort::send(std::size_t clocks, TransferResult* received) {
   if (commands_.replies() > 0) commands_.send_immediate();
   const Time duration = clocks > 0 ? settings_.bits(clocks) : Time{};
   const Time before = os::now();

@@ -46,19 +46,19 @@ class FtdiPort final : public TransferPort {
   [[nodiscard]] DataPin look_at_data();
 
  private:
-  void exchange(const Step<std::uint8_t>& step, Received& received) override;
+  void exchange(const Step<std::uint8_t>& step, TransferResult& received) override;
   [[nodiscard]] std::uint32_t set_rate() const override { return settings_.rate; }
   void change_rate(std::uint32_t rate) override;
 
-  void clock_in(const Step<std::uint8_t>& step, Received& received);
-  void turn(const Step<std::uint8_t>& step, Received& received);
-  void exchange_bytes(const Step<std::uint8_t>& step, Received& received);
+  void clock_in(const Step<std::uint8_t>& step, TransferResult& received);
+  void turn(const Step<std::uint8_t>& step, TransferResult& received);
+  void exchange_bytes(const Step<std::uint8_t>& step, TransferResult& received);
   void hold_low(Time until);
 
   void synchronise();
   void apply(LineSettings settings);
   /// Sends `commands_` and reads the replies into `replies_`. `clocks`: number of clocks that they take.
-  void send(std::size_t clocks, Received* received = nullptr);
+  void send(std::size_t clocks, TransferResult* received = nullptr);
   [[nodiscard]] std::uint8_t rest() const;
   void pause(Time least, std::uint8_t levels);
 

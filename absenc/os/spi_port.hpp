@@ -37,7 +37,7 @@ class SpiPort final : public TransferPort {
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
 
  private:
-  void exchange(const Step<std::uint8_t>& step, Received& received) override;
+  void exchange(const Step<std::uint8_t>& step, TransferResult& received) override;
   [[nodiscard]] std::uint32_t set_rate() const override { return settings_.rate; }
   void change_rate(std::uint32_t rate) override;
   void send_message(bool with_output);

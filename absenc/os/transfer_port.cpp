@@ -25,6 +25,7 @@ void TransferPort::begin(const ByteStep& step) {
       received_.items.clear();
       received_.bits = 0;
       received_.idle_low = false;
+      if (kind_ == LinkKind::clocked_bidirectional && step.rate != 0) change_rate(step.rate);
       exchange(step, received_);
       used_rate_ = set_rate();
       sent_pending_ = true;
@@ -60,7 +61,7 @@ ByteEvent TransferPort::wait(const ByteStep& step) {
   return waiting_.take_due(std::max(os::now(), waiting_.due())).value();
 }
 
-void TransferPort::extract(Bytes samples, std::size_t idle, std::size_t bits, Received& received) {
+void TransferPort::extract(Bytes samples, std::size_t idle, std::size_t bits, TransferResult& received) {
   const BitView clocked{samples, samples.size() * 8};
   received.idle_low = idle > 0 && clocked.load(0, static_cast<unsigned>(idle)) == 0;
   received.bits = bits;

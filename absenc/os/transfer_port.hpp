@@ -30,7 +30,7 @@ class TransferPort : public Port<std::uint8_t> {
 
  protected:
   /// What a transfer has received: the items of an SPI link, or the bits of a clocked one, packed MSB first.
-  struct Received {
+  struct TransferResult {
     std::vector<std::uint8_t> items{};
     std::size_t bits = 0;   // number of bits of a clocked link
     bool idle_low = false;  // whether the data line was low in all idle clocks; false if there were none
@@ -40,19 +40,19 @@ class TransferPort : public Port<std::uint8_t> {
 
   [[nodiscard]] LinkKind kind() const { return kind_; }
   /// Carries out a transfer, not before `step.at`. Leaves `received` empty if nothing was clocked.
-  virtual void exchange(const Step<std::uint8_t>& step, Received& received) = 0;
+  virtual void exchange(const Step<std::uint8_t>& step, TransferResult& received) = 0;
   /// Returns the clock rate in Hz that the port makes with its present settings.
   [[nodiscard]] virtual std::uint32_t set_rate() const = 0;
   /// Switches to another clock rate, in Hz.
   virtual void change_rate(std::uint32_t rate) = 0;
 
   /// Moves `bits` samples behind the first `idle` ones out of `samples` into `received`.
-  static void extract(Bytes samples, std::size_t idle, std::size_t bits, Received& received);
+  static void extract(Bytes samples, std::size_t idle, std::size_t bits, TransferResult& received);
 
  private:
   LinkKind kind_;
   std::uint32_t used_rate_ = 0;  // clock rate of the last transfer in Hz; 0: there was none
-  Received received_{};
+  TransferResult received_{};
   Waiting<std::uint8_t> waiting_;
   bool sent_pending_ = false;      // whether the event `sent` is still to be reported
   bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`

@@ -79,6 +79,11 @@ std::vector<std::string> spi_devices(const std::filesystem::path& sys) {
 SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice,
                  SpiKernel& kernel)
     : TransferPort(kind), path_(path), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
+  if (kind == LinkKind::clocked_bidirectional) {
+    throw Failure(Kind::unsupported,
+                  "an SPI controller of Linux cannot turn the direction of its data line within a transfer: use an "
+                  "FT232H (docs/clock-cable.md), or a microcontroller");
+  }
   if (!descriptor_) throw spi_failure(path, errno);
   std::uint32_t mode = 0;
   if (control(SPI_IOC_RD_MODE32, &mode) < 0) throw spi_failure(path, errno);
@@ -88,7 +93,7 @@ SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& set
   apply(settings);
 }
 
-void SpiPort::exchange(const ByteStep& step, Received& received) {
+void SpiPort::exchange(const ByteStep& step, TransferResult& received) {
   if (step.hold_low) {
     hold_low(step.at);
   } else {

@@ -12,14 +12,16 @@ using namespace author;
 
 namespace {
 
-Code position_code(const Format& format) { return format.version == Version::v21 ? Code::position : Code::position_22; }
+ModeCommand position_code(const Format& format) {
+  return format.version == Version::v21 ? ModeCommand::position : ModeCommand::position_22;
+}
 
 // ---- Words of the memory by commands of EnDat 2.1
 
 // Selects an area, unless `selected` has its MRS code, which is the last one that this procedure selected.
 Part<bool> select(Dialog& dialog, std::uint8_t& selected, std::uint8_t mrs, std::string_view step) {
   if (selected == mrs) co_return true;
-  const Result<Reply> reply = co_await dialog.attempt({.code = Code::select, .byte = mrs});
+  const Result<Reply> reply = co_await dialog.attempt({.code = ModeCommand::select, .byte = mrs});
   if (reply.error() == Error::request_rejected) {
     co_await dialog.stop({Error::unsupported, "the encoder does not have this memory area"});
   }
@@ -30,29 +32,29 @@ Part<bool> select(Dialog& dialog, std::uint8_t& selected, std::uint8_t mrs, std:
 
 Part<std::uint16_t> read_word_21(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
   co_await select(dialog, selected, word.mrs, step);
-  const Reply reply = co_await dialog.ask({.code = Code::read, .byte = word.address}).or_say(step);
+  const Reply reply = co_await dialog.ask({.code = ModeCommand::read, .byte = word.address}).or_say(step);
   co_return reply.word;
 }
 
 // ---- Words of the memory by commands of EnDat 2.2
 
 // Additional informations that the encoder sent when a procedure began: their MRS codes, 0 if there was none.
-struct Selection {
+struct SelectedInfos {
   std::uint8_t info1 = 0;
   std::uint8_t info2 = 0;
 
-  friend bool operator==(const Selection&, const Selection&) = default;
+  friend bool operator==(const SelectedInfos&, const SelectedInfos&) = default;
 };
 
 std::uint8_t code_of(const Info* info) { return info == nullptr ? 0 : static_cast<std::uint8_t>(0x40 | info->number); }
 
 // Finds out which informations are selected: a supplement would collide with one that the host does not know of. Two
 // positions in a row must agree, because ones behind the position, as a damaged line gives them, mean none.
-Part<Selection> find_selection(Dialog& dialog) {
-  Selection found;
+Part<SelectedInfos> find_selection(Dialog& dialog) {
+  SelectedInfos found;
   for (bool first = true;; first = false) {
-    const Reply reply = co_await dialog.ask({.code = Code::position_22, .seeks_infos = true});
-    const Selection now{code_of(reply.info(1)), code_of(reply.info(2))};
+    const Reply reply = co_await dialog.ask({.code = ModeCommand::position_22, .seeks_infos = true});
+    const SelectedInfos now{code_of(reply.info(1)), code_of(reply.info(2))};
     if (!first && now == found) break;
     found = now;
   }
@@ -65,7 +67,7 @@ Part<Selection> find_selection(Dialog& dialog) {
 
 // Selects a memory area or, with an MRS code from 40 to 5F, an additional information.
 Part<bool> select_22(Dialog& dialog, std::uint8_t mrs, std::string_view step) {
-  co_await dialog.ask({.code = Code::select_22, .byte = mrs}).or_say(step);
+  co_await dialog.ask({.code = ModeCommand::select_22, .byte = mrs}).or_say(step);
   Format format = dialog.format();
   constexpr std::uint8_t stop = 0x0F;
   if (mrs >> 4 == 4) format.info1 = (mrs & 0x0F) == stop ? 0 : mrs;
@@ -75,7 +77,7 @@ Part<bool> select_22(Dialog& dialog, std::uint8_t mrs, std::string_view step) {
 }
 
 // Selects what was selected when the procedure began.
-Part<bool> restore(Dialog& dialog, Selection before) {
+Part<bool> restore(Dialog& dialog, SelectedInfos before) {
   constexpr std::string_view step = "it was done, but the additional information from before is not selected again";
   if (dialog.format().info1 != before.info1) {
     co_await select_22(dialog, before.info1 != 0 ? before.info1 : std::uint8_t{mrs::stop_info_1}, step);
@@ -90,7 +92,7 @@ Part<bool> restore(Dialog& dialog, Selection before) {
 Part<Info> wait_until_ready(Dialog& dialog, std::string_view step) {
   const Time limit = dialog.received_at() + memory_access_time;
   for (;;) {
-    const Reply reply = co_await dialog.ask({.code = Code::position_22}).or_say(step);
+    const Reply reply = co_await dialog.ask({.code = ModeCommand::position_22}).or_say(step);
     const Info* const info = reply.info(1);
     if (info == nullptr) co_await dialog.stop({Error::unexpected_reply, "the encoder sends no additional information"});
     if (!info->busy) co_return *info;
@@ -119,7 +121,7 @@ Part<bool> select_area_22(Dialog& dialog, std::uint8_t area, std::string_view st
 }
 
 Part<std::uint16_t> read_word_22(Dialog& dialog, std::uint8_t address, std::string_view step) {
-  co_await dialog.ask({.code = Code::read_22, .byte = address}).or_say(step);
+  co_await dialog.ask({.code = ModeCommand::read_22, .byte = address}).or_say(step);
   const std::uint16_t low = co_await read_info_1(dialog, mrs::memory_low, step);
   const std::uint16_t high = co_await read_info_1(dialog, mrs::memory_high, step);
   if (low >> 8 != address || high >> 8 != address) {
@@ -199,8 +201,13 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
 
 Procedure read_position(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
-  const Reading reading = co_await look(dialog, found);
-  if (reading.alarms != 0) co_await read_alarms(dialog, found);
+  for (int tries = 0; tries < most_tries; ++tries) {
+    const Reading reading = co_await look(dialog, found);
+    if (reading.alarms == 0) break;
+    // An error bit without an error message may be damage that the checksum misses: the position is read again.
+    const std::uint32_t alarms = co_await read_alarms(dialog, found);
+    if ((alarms & (alarm::errors | alarm::warnings)) != 0) break;
+  }
   co_return done;
 }
 
@@ -217,7 +224,7 @@ Procedure clear_alarms(Dialog& dialog, ProcedureResult& found) {
   co_await select(dialog, selected, area::status, "nothing was cleared");
   for (const WordPlace word : {error_word, warning_word}) {
     // If the reply is lost, the alarms that are read afterwards show whether they were cleared.
-    static_cast<void>(co_await dialog.attempt({.code = Code::write, .byte = word.address, .word = 0}).changes());
+    static_cast<void>(co_await dialog.attempt({.code = ModeCommand::write, .byte = word.address, .word = 0}).changes());
   }
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
@@ -313,12 +320,12 @@ Part<std::uint16_t> read_any_word(Dialog& dialog, std::uint8_t& selected, WordPl
 }
 
 // Prepares for accesses to the memory: EnDat 2.2 needs to know what is selected, and the length of a position.
-Part<Selection> begin_access(Dialog& dialog) {
-  if (dialog.format().version == Version::v21) co_return Selection{};
+Part<SelectedInfos> begin_access(Dialog& dialog) {
+  if (dialog.format().version == Version::v21) co_return SelectedInfos{};
   co_await know_resolution(dialog);
   co_return co_await find_selection(dialog);
 }
-Part<bool> end_access(Dialog& dialog, Selection before) {
+Part<bool> end_access(Dialog& dialog, SelectedInfos before) {
   if (dialog.format().version == Version::v22) co_await restore(dialog, before);
   co_await dialog.rest(long_recovery);
   co_return true;
@@ -336,7 +343,7 @@ Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments argument
   if (area == nullptr || arguments[1] + count > area->first + area->count) {
     co_return {Error::invalid_argument, no_such_word};
   }
-  const Selection before = co_await begin_access(dialog);
+  const SelectedInfos before = co_await begin_access(dialog);
   std::uint8_t selected = 0;
   for (std::int64_t i = 0; i < count; ++i) {
     const WordPlace place{mrs, static_cast<std::uint8_t>(first + i)};
@@ -359,14 +366,12 @@ Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::u
   const std::uint16_t before = co_await read_any_word(dialog, selected, place, "nothing was written");
   if (before == value) co_return false;
   const bool by_22 = dialog.format().version == Version::v22;
-  const Request request{.code = by_22 ? Code::write_22 : Code::write, .byte = place.address, .word = value};
+  const Request request{
+      .code = by_22 ? ModeCommand::write_22 : ModeCommand::write, .byte = place.address, .word = value};
   // If the reply to the write is lost, reading the word back shows whether it was written.
   const Result<Reply> written = co_await dialog.attempt(request).changes();
-  if (written.error() == Error::request_rejected) {
-    dialog.refused();
-    co_await dialog.stop(
-        {Error::request_rejected, "the encoder refuses to write this word: it may be write-protected"});
-  }
+  // A refusal may be a damaged reply, too, which the checksum misses in one of 32.
+  dialog.changes();
   if (by_22) {
     co_await wait_until_ready(dialog, "the word was written, but could not be read back");
   } else {
@@ -376,6 +381,10 @@ Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::u
       co_await read_any_word(dialog, selected, place, "the word was written, but could not be read back");
   if (now == value) co_return true;
   if (now == before) dialog.refused();
+  if (now == before && written.error() == Error::request_rejected) {
+    co_await dialog.stop(
+        {Error::request_rejected, "the encoder refuses to write this word: it may be write-protected"});
+  }
   co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
                         "look at what is there with `absenc memory read` before you write it again"});
   co_return false;
@@ -393,7 +402,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
   found.area = place.mrs;
   found.address = place.address;
   found.value = static_cast<std::uint16_t>(arguments[2]);
-  const Selection before = co_await begin_access(dialog);
+  const SelectedInfos before = co_await begin_access(dialog);
   std::uint8_t selected = 0;
   found.written = co_await store(dialog, selected, place, *found.value);
   co_await end_access(dialog, before);
@@ -403,7 +412,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
 // ---- Resets, zero, recovery time
 
 Procedure reset(Dialog& dialog, ProcedureResult& found) {
-  static_cast<void>(co_await dialog.ask({.code = Code::reset}).changes());
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset}).changes());
   co_await dialog.rest(reset_time);
   // A reset ends the selection of additional information.
   Format format = dialog.format();
@@ -417,13 +426,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found) {
 Procedure reset_errors(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   co_await find_selection(dialog);
-  static_cast<void>(co_await dialog.ask({.code = Code::error_reset_22}).changes());
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::error_reset_22}).changes());
   Format format = dialog.format();
   format.info1 = format.info2 = 0;
   dialog.set_format(format);
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
-  if (has_error(Code::position_22, dialog.last())) {
+  if (has_error(ModeCommand::position_22, dialog.last())) {
     co_return {Error::cross_check_failed, "an error remains",
                "`absenc run ... status` names it, then `absenc clear-alarms`"};
   }
@@ -480,22 +489,22 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
                                             static_cast<std::uint16_t>(wanted >> 16)};
   co_await select(dialog, selected, area::operating, "nothing was changed");
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const Request request{.code = Code::write, .byte = places[i].address, .word = values[i]};
-    const Result<Reply> reply = co_await dialog.attempt(request).changes();
-    if (reply.error() == Error::request_rejected) {
-      co_return {Error::request_rejected,
-                 "the encoder refuses another datum shift: its operating parameters may be write-protected"};
-    }
+    const Request request{.code = ModeCommand::write, .byte = places[i].address, .word = values[i]};
+    // A refusal may be a damaged reply, too: reading the word back shows whether it was written.
+    static_cast<void>(co_await dialog.attempt(request).changes());
+    dialog.changes();
     co_await dialog.rest(memory_access_time);
     const std::uint16_t now =
         co_await read_word_21(dialog, selected, places[i], "the datum shift was written, but could not be read back");
     if (now != values[i]) {
-      co_return {Error::cross_check_failed, "the encoder has another datum shift than was written",
-                 "read words 0 and 1 of area 0xA7 with `absenc memory read`"};
+      co_return {
+          Error::cross_check_failed,
+          "the encoder has another datum shift than was written: its operating parameters may be write-protected",
+          "read words 0 and 1 of area 0xA7 with `absenc memory read`"};
     }
   }
-  static_cast<void>(
-      co_await dialog.ask({.code = Code::reset}).or_say("the datum shift is stored and holds after the next start"));
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset})
+                        .or_say("the datum shift is stored and holds after the next start"));
   co_await dialog.rest(reset_time);
   Format format = dialog.format();
   format.info1 = format.info2 = 0;
@@ -531,9 +540,10 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
     co_await dialog.rest(long_recovery);
     co_return done;
   }
-  const Request request{.code = Code::write, .byte = initialisation_word.address, .word = wanted};
+  const Request request{.code = ModeCommand::write, .byte = initialisation_word.address, .word = wanted};
   // If the reply to the write is lost, reading the word back shows whether it was written.
   static_cast<void>(co_await dialog.attempt(request).changes());
+  dialog.changes();
   co_await dialog.rest(memory_access_time);
   const std::uint16_t now = co_await read_word_21(dialog, selected, initialisation_word,
                                                   "the recovery time was written, but could not be read back");
@@ -548,7 +558,7 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   co_await know_resolution(dialog);
-  const Selection before = co_await find_selection(dialog);
+  const SelectedInfos before = co_await find_selection(dialog);
   for (const std::int64_t code : arguments) {
     if (code != 0) co_await select_22(dialog, static_cast<std::uint8_t>(code), "the information could not be selected");
     co_await find_selection(dialog);
@@ -566,7 +576,7 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
 
 Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
-  const Selection before = co_await find_selection(dialog);
+  const SelectedInfos before = co_await find_selection(dialog);
   co_await select_22(dialog, mrs::nothing, "");
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
