@@ -159,7 +159,11 @@ void ClockedDecoder::detect_data_change(Tick until) {
 }
 
 bool ClockedDecoder::is_over(Tick rest) const {
-  if (format_.low_goes_on && !clock_.level) return false;
+  if (format_.low_goes_on) {
+    if (!clock_.level) return false;
+    // A pause between fast exchanges may be shorter than half a period of the clock of slow ones.
+    if (open_ && rest > 3 * half_) return true;
+  }
   return rest > format_.pause || (changed_ && rest > format_.change_pause);
 }
 

@@ -31,14 +31,14 @@ constexpr int usb_timeout_ms = 3000;
 
 constexpr const char* rule = "60-absenc-ftdi.rules";
 
-Failure no_permission(const FtdiAdapter& adapter) {
+Failure ftdi_no_permission(const FtdiAdapter& adapter) {
   return {Kind::no_permission, "no permission to open the " + adapter.words() + " (" + adapter.device +
                                    "): copy the udev rule " + rule +
                                    " of absenc to /etc/udev/rules.d (the package absenc installs it), then "
                                    "unplug the adapter and plug it in"};
 }
 
-Failure in_use(const FtdiAdapter& adapter) {
+Failure ftdi_in_use(const FtdiAdapter& adapter) {
   const std::string holder = holder_of(adapter.device);
   return {
       "the " + adapter.words() + " is in use by " + (holder.empty() ? "another program" : holder) + ": end that first",
@@ -94,9 +94,9 @@ class Channel final : public FtdiChannel {
   // libftdi reports the step that failed, but not always the reason, so the device file is tried.
   [[nodiscard]] Failure refusal() const {
     if (::access(adapter_.device.c_str(), F_OK) != 0) return lost(adapter_);
-    if (::access(adapter_.device.c_str(), R_OK | W_OK) != 0) return no_permission(adapter_);
+    if (::access(adapter_.device.c_str(), R_OK | W_OK) != 0) return ftdi_no_permission(adapter_);
     const std::string text = ::ftdi_get_error_string(context_);
-    if (text.find("claim") != std::string::npos) return in_use(adapter_);
+    if (text.find("claim") != std::string::npos) return ftdi_in_use(adapter_);
     return {Kind::system, "libftdi could not open the " + adapter_.words() + ": " + text};
   }
 
@@ -142,7 +142,7 @@ std::vector<FtdiAdapter> ftdi_adapters(const fs::path& sys, const fs::path& dev)
     adapter.bus = static_cast<std::uint8_t>(bus);
     adapter.address = static_cast<std::uint8_t>(address);
     adapter.device = dev / three_digits(bus) / three_digits(address);
-    if (::access(adapter.device.c_str(), R_OK | W_OK) != 0) adapter.refusal = no_permission(adapter).what();
+    if (::access(adapter.device.c_str(), R_OK | W_OK) != 0) adapter.refusal = ftdi_no_permission(adapter).what();
     found.push_back(std::move(adapter));
   }
   std::sort(found.begin(), found.end(), [](const FtdiAdapter& one, const FtdiAdapter& other) {

@@ -11,11 +11,6 @@ namespace {
 
 /// Requirements on EnDat encoders.
 constexpr auto clauses = std::array{
-    Clause{.id = "start",
-           .paragraph = "The line",
-           .words = "behind the mode command a start bit comes within the calculation time",
-           .demand = Demand::as_drawn,
-           .errors = any_of(Error::line_stuck, Error::truncated)},
     Clause{"crc", "Checksum", "five bits of CRC, inverted, over the error bits and the position", Demand::checked},
     Clause{.id = "memory-write",
            .paragraph = "Memory",
@@ -29,16 +24,6 @@ constexpr auto clauses = std::array{
            .demand = Demand::byte_alone,
            .page = 0xA9,
            .address = 8},
-    Clause{.id = "zero",
-           .paragraph = "Zero by datum shift",
-           .words = "the datum shift makes the position 0, to a signal period",
-           .demand = Demand::zero},
-    Clause{.id = "clear-alarms",
-           .paragraph = "Alarms",
-           .words = "0 in words 0 and 1 of the operating status clears error messages and warnings",
-           .demand = Demand::reset,
-           .value = alarm::errors | alarm::warnings | alarm::error,
-           .verb = Verb::clear_alarms},
 };
 
 }  // namespace

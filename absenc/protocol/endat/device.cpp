@@ -96,7 +96,7 @@ void VirtualEncoder::write_parameters() {
   }
   store(errors_supported_word, supported_errors);
   store(warnings_supported_word, supported_warnings);
-  store(command_set_word, format_.version == Version::v22 ? 1 : 0);
+  store(command_set_word, format_.version == CommandSet::v22 ? 1 : 0);
   store(initialisation_word, format_.recovery == Recovery::short_time ? short_recovery_bits : long_recovery_bits);
 }
 
@@ -139,7 +139,7 @@ void VirtualEncoder::selected(Time at, Time period) {
   period_ = period == Time{} ? format_.period() : period;
   latched_at_ = at;
   needed_clocks_ = 0;
-  const std::uint32_t fastest = format_.version == Version::v21 ? fastest_21 : fastest_22;
+  const std::uint32_t fastest = format_.version == CommandSet::v21 ? fastest_21 : fastest_22;
   expect(period_ >= Time(1'000'000'000 / fastest), rules::fastest, at);
   expect(period_ <= Time(1'000'000'000 / slowest), rules::slowest, at);
   is_valid_ = expect(at >= free_at_, rules::recovery, at);
@@ -155,7 +155,8 @@ void VirtualEncoder::respond(BitView request, Time at, AnswerBits& bits) {
   now_ = at;
   request_ = {};
   const auto code = static_cast<std::uint8_t>(request.load(lead_bits, 6));
-  is_valid_ = is_valid_ && is_code(code) && (format_.version == Version::v22 || !is_22(static_cast<ModeCommand>(code)));
+  is_valid_ =
+      is_valid_ && is_code(code) && (format_.version == CommandSet::v22 || !is_22(static_cast<ModeCommand>(code)));
   // An encoder that does not understand its request drives nothing.
   if (!is_valid_) return;
   request_.code = static_cast<ModeCommand>(code);

@@ -399,8 +399,8 @@ constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t 
   // WRN is known from additional information only, unless a warning is set.
   const bool knows_group = warnings != 0 || (reading.alarms_reported & alarm::warning) != 0;
   reading.alarms &= alarm::error | alarm::warning;
-  reading.alarms |=
-      alarms_of(errors, warnings) | (errors != 0 ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
+  const bool wrong = errors != 0 || reading.singleturn_valid_bits == 0;
+  reading.alarms |= alarms_of(errors, warnings) | (wrong ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
   reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
   if (errors != 0) reading.singleturn_valid_bits = 0;
   reading.multiturn_valid = reading.multiturn_valid && errors == 0;
@@ -426,9 +426,10 @@ constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t 
   reading.multiturn = resolution.multiturn_bits == 0 ? 0 : reply.position >> resolution.singleturn_bits;
   reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
   reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
+  // Without additional information nothing tells of warnings: which alarms are raised stays open until they are read.
+  if (reply.info_count == 0) return reading;
   reading.alarms = wrong ? alarm::error : 0;
   reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
-  if (reply.info_count == 0) return reading;
   const bool warns = reply.infos[0].warning;
   if (warns) reading.alarms |= alarm::warning;
   reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;

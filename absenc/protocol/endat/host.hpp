@@ -43,7 +43,7 @@ class ReadPosition : public author::HostOf<Protocol> {
         new (&reading_) Reading(drop_unasked(format(), position_request_.code, reply_));  // saves a copy
         reading_.latched = begun_at();
         reading_.received = received_at();
-        if (reading_.alarms == 0) break;
+        if (reading_.alarms == 0 && reading_.singleturn_valid_bits != 0) break;
         stage_ = Stage::area;
         return ask({.code = ModeCommand::select, .byte = area::status});
       case Stage::area:

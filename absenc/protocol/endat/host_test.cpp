@@ -105,7 +105,7 @@ TEST(EndatEncoder, NamesBothWhenHostDrivesIntoTheReply) {
 }
 
 TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
-  const auto broken_at = [](std::uint32_t rate, Version version) {
+  const auto broken_at = [](std::uint32_t rate, CommandSet version) {
     Format format = rotary;
     format.version = version;
     Bench bench(format);
@@ -114,10 +114,10 @@ TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
     bench.run(host);
     return bench.encoder.violation_count() == 0 ? std::string() : std::string(bench.encoder.violations()[0].rule);
   };
-  EXPECT_EQ(broken_at(2'000'000, Version::v21), "");
-  EXPECT_EQ(broken_at(2'100'000, Version::v21), rules::fastest);
-  EXPECT_EQ(broken_at(8'000'000, Version::v22), "");
-  EXPECT_EQ(broken_at(90'000, Version::v22), rules::slowest);
+  EXPECT_EQ(broken_at(2'000'000, CommandSet::v21), "");
+  EXPECT_EQ(broken_at(2'100'000, CommandSet::v21), rules::fastest);
+  EXPECT_EQ(broken_at(8'000'000, CommandSet::v22), "");
+  EXPECT_EQ(broken_at(90'000, CommandSet::v22), rules::slowest);
 }
 
 }  // namespace

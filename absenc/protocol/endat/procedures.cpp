@@ -13,7 +13,7 @@ using namespace author;
 namespace {
 
 ModeCommand position_code(const Format& format) {
-  return format.version == Version::v21 ? ModeCommand::position : ModeCommand::position_22;
+  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
 }
 
 // ---- Words of the memory by commands of EnDat 2.1
@@ -85,6 +85,7 @@ Part<bool> restore(Dialog& dialog, SelectedInfos before) {
   if (dialog.format().info2 != before.info2) {
     co_await select_22(dialog, before.info2 != 0 ? before.info2 : std::uint8_t{mrs::stop_info_2}, step);
   }
+  co_await dialog.rest(long_recovery);
   co_return true;
 }
 
@@ -203,7 +204,7 @@ Procedure read_position(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   for (int tries = 0; tries < most_tries; ++tries) {
     const Reading reading = co_await look(dialog, found);
-    if (reading.alarms == 0) break;
+    if (reading.alarms == 0 && reading.singleturn_valid_bits != 0) break;
     // An error bit without an error message may be damage that the checksum misses: the position is read again.
     const std::uint32_t alarms = co_await read_alarms(dialog, found);
     if ((alarms & (alarm::errors | alarm::warnings)) != 0) break;
@@ -313,7 +314,7 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
 namespace {
 
 Part<std::uint16_t> read_any_word(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
-  if (dialog.format().version == Version::v21) co_return co_await read_word_21(dialog, selected, word, step);
+  if (dialog.format().version == CommandSet::v21) co_return co_await read_word_21(dialog, selected, word, step);
   if (selected != word.mrs) co_await select_area_22(dialog, word.mrs, step);
   selected = word.mrs;
   co_return co_await read_word_22(dialog, word.address, step);
@@ -321,12 +322,12 @@ Part<std::uint16_t> read_any_word(Dialog& dialog, std::uint8_t& selected, WordPl
 
 // Prepares for accesses to the memory: EnDat 2.2 needs to know what is selected, and the length of a position.
 Part<SelectedInfos> begin_access(Dialog& dialog) {
-  if (dialog.format().version == Version::v21) co_return SelectedInfos{};
+  if (dialog.format().version == CommandSet::v21) co_return SelectedInfos{};
   co_await know_resolution(dialog);
   co_return co_await find_selection(dialog);
 }
 Part<bool> end_access(Dialog& dialog, SelectedInfos before) {
-  if (dialog.format().version == Version::v22) co_await restore(dialog, before);
+  if (dialog.format().version == CommandSet::v22) co_return co_await restore(dialog, before);
   co_await dialog.rest(long_recovery);
   co_return true;
 }
@@ -365,7 +366,7 @@ namespace {
 Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::uint16_t value) {
   const std::uint16_t before = co_await read_any_word(dialog, selected, place, "nothing was written");
   if (before == value) co_return false;
-  const bool by_22 = dialog.format().version == Version::v22;
+  const bool by_22 = dialog.format().version == CommandSet::v22;
   const Request request{
       .code = by_22 ? ModeCommand::write_22 : ModeCommand::write, .byte = place.address, .word = value};
   // If the reply to the write is lost, reading the word back shows whether it was written.
@@ -532,6 +533,11 @@ Procedure read_recovery(Dialog& dialog, ProcedureResult& found) {
 Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   std::uint8_t selected = 0;
   const std::uint16_t before = co_await read_word_21(dialog, selected, initialisation_word, "nothing was changed");
+  // The other bits of the word are written back as they were read, and the checksum misses one damaged reply of 32.
+  if (co_await read_word_21(dialog, selected, initialisation_word, "nothing was changed") != before) {
+    co_return {Error::cross_check_failed, "two reads of the recovery time disagree; nothing was changed",
+               "check wiring and clock rate, then try again"};
+  }
   const std::uint16_t bits = arguments[0] == 0 ? long_recovery_bits : short_recovery_bits;
   const auto wanted = static_cast<std::uint16_t>((before & ~recovery_mask) | bits);
   found.recovery = static_cast<std::uint8_t>(arguments[0]);

@@ -74,7 +74,7 @@ constexpr std::array<Argument, 2> communicate_arguments{
     {{"port", "address of the encoder", 0, 255}, {"instruction", "16 bits", 0, 0xFFFF}}};
 
 constexpr ModeCommand code_of_position(const Format& format) {
-  return format.version == Version::v21 ? ModeCommand::position : ModeCommand::position_22;
+  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
 }
 constexpr Request ask_for_position(const Format& format) { return {.code = code_of_position(format)}; }
 constexpr Request ask_for_position_with(const Format& format, Arguments) { return ask_for_position(format); }
@@ -91,12 +91,12 @@ constexpr Request ask_to_select(const Format&, Arguments) {
 }
 // A command that begins by selecting the area of its first argument.
 constexpr Request ask_for_area(const Format& format, Arguments arguments) {
-  if (format.version == Version::v22) return {.code = ModeCommand::position_22};
+  if (format.version == CommandSet::v22) return {.code = ModeCommand::position_22};
   return {.code = ModeCommand::select, .byte = static_cast<std::uint8_t>(arguments[0])};
 }
 
 constexpr std::string_view no_22(const Format& format) {
-  return format.version == Version::v21 ? "this needs EnDat 2.2 (option version)" : "";
+  return format.version == CommandSet::v21 ? "this needs EnDat 2.2 (option version)" : "";
 }
 constexpr bool is_asked(const Format& format) { return !format.is_known(); }
 
@@ -212,7 +212,7 @@ constexpr bool is_possible(const Format& format) {
   const bool both = format.is_linear() && format.singleturn_bits + format.multiturn_bits != 0;
   const bool is_scaled = !format.is_linear() || format.unit_pm > 0;
   return selects_1 && selects_2 && !both && is_scaled && format.bits() <= most_bits &&
-         (format.version == Version::v22 || std::uint32_t{format.clock_khz} * 1000 <= fastest_21);
+         (format.version == CommandSet::v22 || std::uint32_t{format.clock_khz} * 1000 <= fastest_21);
 }
 
 constexpr Resolution resolution_by(const Format& format) { return with_resolution(format).resolution(); }
