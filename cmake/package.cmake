@@ -27,7 +27,7 @@ set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_NAME libabsenc-dev)
 set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SECTION libdevel)
 if(TARGET absenc-client)
   set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_DEPENDS
-      "libdeflate-dev, libfmt-dev, libftdi1-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libtomlplusplus-dev, libzip-dev")
+      "libdeflate-dev, libfmt-dev, libftdi1-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libtomlplusplus-dev, libusb-1.0-0-dev, libzip-dev")
 endif()
 string(JOIN "\n" CPACK_DEBIAN_LIBABSENC-DEV_DESCRIPTION
   "${PROJECT_DESCRIPTION} (development files)"

@@ -394,7 +394,7 @@ class Completion(Case):
         self.assertEqual(self.complete("read", "--json", "tf"), ["compopt -o nospace", "tformat:"])
         self.assertEqual(self.complete("read", "sim", ":", "tf"), ["tformat"])
         self.assertEqual(self.complete("read", '"sim:tf'), ["sim:tformat"])
-        self.assertEqual(self.complete("read", "tformat", ":"), ["compopt -o nospace", "/", "slcan:", "spi:", "tcp:"])
+        self.assertEqual(self.complete("read", "tformat", ":"), ["compopt -o nospace", "/", "ftdi", "slcan:", "spi:", "tcp:"])
         (self.folder / "tty one").touch()
         for path in ("tty", "tty o"):
             with self.subTest(path):

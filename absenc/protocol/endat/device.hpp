@@ -18,13 +18,21 @@ inline constexpr auto conditions = std::array{
 
 /// Rules for hosts that the virtual encoder checks. The words are those of the clauses.
 namespace rules {
+/// Pause that the encoder needs after an exchange.
 inline constexpr std::string_view recovery = "clocked before the recovery time has passed";
+/// Highest rate of the clock.
 inline constexpr std::string_view fastest = "clock faster than the encoder's version allows";
+/// Lowest rate of the clock.
 inline constexpr std::string_view slowest = "clock slower than 100 kHz";
+/// Highest rate of the clock for parameters.
 inline constexpr std::string_view parameter_clock = "parameters clocked faster than 2 MHz";
+/// Clocks that a reply needs.
 inline constexpr std::string_view few_clocks = "fewer clocks than the reply has bits";
+/// Parameters only after the reply.
 inline constexpr std::string_view collision = "the host drives parameters while the encoder drives its reply";
+/// Supplement only after the reply.
 inline constexpr std::string_view early_supplement = "the host drives a supplement while the encoder drives its reply";
+/// Memory only while it is not busy.
 inline constexpr std::string_view busy = "the memory accessed while BUSY is set";
 }  // namespace rules
 

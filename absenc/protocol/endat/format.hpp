@@ -103,6 +103,7 @@ inline constexpr std::uint8_t status = 0xB9;     ///< Operating status: errors, 
 inline constexpr std::uint8_t maker_22 = 0xBD;   ///< Parameters of the encoder's maker for EnDat 2.2.
 }  // namespace area
 
+/// Returns the description of `count` words of an area, the first of which has the number `first`.
 constexpr MemoryArea words(std::uint32_t mrs, std::uint32_t first, std::uint32_t count, std::string_view meaning,
                            bool writable) {
   return {.page = mrs, .first = first, .count = count, .meaning = meaning, .writable = writable, .word = 2};
