@@ -141,7 +141,7 @@ class SpiAddress(Case):
         self.assertIn("ssi:spi:/dev/spidev0.0", absenc("--help").stdout)
         listed = absenc("list", "ssi").stdout
         self.assertRegex(listed, r"speed=HZ +spi, ftdi ")
-        self.assertRegex(listed, r"spi_mode=0\.\.3 +spi ")
+        self.assertRegex(listed, r"spi_mode=0\.\.3 +spi, ftdi ")
 
 
 
