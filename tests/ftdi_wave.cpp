@@ -29,19 +29,21 @@ int run(const std::string& what, const char* name, int count, const char* path) 
   const Command* command = find_command(unit, name);
   if (command == nullptr) return 2;
   std::vector<std::byte> storage(unit.host_storage);
+  bool failed = false;
   for (int i = 0; i < count; ++i) {
     const auto host = unit.host(address.options, *command, {}, storage);
     if (!host::drive(*host.bytes, port, [] { return true; })) return 1;
     if (const Error error = host.bytes->error(); error != Error::none) {
       std::fprintf(stderr, "%s\n", std::string(text_of(error).description).c_str());
-      return 1;
+      failed = true;
+      break;
     }
   }
   wires.pass(os::now() + std::chrono::milliseconds(1));
   std::ofstream file(path);
   wires.write_vcd(file);
   std::printf("%u\n", port.settings().rate);
-  return usb.mpsse.misused() == 0 ? 0 : 1;
+  return usb.mpsse.misused() == 0 && !failed ? 0 : 1;
 }
 
 }  // namespace

@@ -72,6 +72,25 @@ class FtdiWave(Case):
                 for row, value in zip(rows, values):
                     self.assertEqual(f"{value:0{len(words[0])}b}"[: len(row["reply"])], row["reply"])
 
+    def test_endat_in_both_directions(self):
+        encoder = "endat?model=ECN-1325"
+        # the rate of the last exchange
+        for command, rate in (("position", 1000000), ("info", 100000), ("status", 100000), ("temperature", 1000000)):
+            with self.subTest(command):
+                path, made = self.wave(f"{encoder}&singleturn=12345", command=command, count=2)
+                self.assertEqual(made, rate)
+                rows = self.decoded(encoder, path)
+                self.assertEqual([row for row in rows if not row["ok"]], [])
+                self.assertGreaterEqual(len(rows), 2)
+                positions = [row["fields"]["singleturn"] for row in rows if "singleturn" in row["fields"]]
+                self.assertEqual(positions, [12345] * len(positions))
+                self.assertEqual(positions == [], command == "info")
+                edges = changes(path, "!")
+                pauses = [after - before for (before, level), (after, _) in zip(edges, edges[1:])
+                          if level and after - before > 10_000]
+                self.assertGreaterEqual(len(pauses), len(rows) - 1)
+                self.assertGreaterEqual(min(pauses), 30_000)  # the recovery time, README.md of endat
+
     def test_ssi_at_every_clock(self):
         for khz, rate in CLOCKS:
             with self.subTest(khz=khz):

@@ -203,6 +203,8 @@ void FtdiPort::turn(const ByteStep& step, TransferResult& received) {
     pause(longest_pause, high);
     commands_.read_pins();
     if (step.goes_on) commands_.set_pins(low);
+  } else {
+    commands_.read_pins();  // a reply, because a USB write ends before the chip has sent the bits
   }
   rests_low_ = step.goes_on;
   send(step.bits, &received);

@@ -32,10 +32,13 @@ void EncoderWires::change(Time at, std::uint8_t levels, std::uint8_t outputs) {
     if (records_) recorded_direction_.push_back({at, driving});
     if (!driving) turn(at);
   }
-  out_ = (levels & Mpsse::out) != 0;
+  const bool out = (levels & Mpsse::out) != 0;
+  if (std::exchange(out_, out) != out && records_) recorded_out_.push_back({at, out});
   // A pin that is no output is pulled up.
   const bool high = (outputs & Mpsse::clock) == 0 || (levels & Mpsse::clock) != 0;
-  if (std::exchange(clock_, high) == high) return;
+  if (clock_ == high) return;
+  pass(at);  // a rest of the clock up to this edge may have ended the transfer
+  clock_ = high;
   if (records_) recorded_clock_.push_back({at, high});
   if (!fault.no_clock) high ? rises(at) : falls(at);
 }
@@ -64,7 +67,6 @@ void EncoderWires::pass(Time now) {
 }
 
 void EncoderWires::falls(Time at) {
-  pass(at);
   fell_at_ = last_edge_ = at;
 }
 
@@ -102,7 +104,9 @@ void EncoderWires::select(Time at, Time period) {
 
 void EncoderWires::deselect(Time at) {
   selected_ = false;
-  if (!levels_.back().level) levels_.push_back({at + width_, true});  // until then the device drives the line low
+  // Until then the device drives the line low; on a bidirectional line it sends its last bit for a whole period.
+  const Time held = kind_ == LinkKind::clocked_bidirectional ? std::max(width_, 2 * half_) : width_;
+  if (!levels_.back().level) levels_.push_back({at + held, true});
   feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
 }
 
@@ -168,17 +172,28 @@ void EncoderWires::write_vcd(std::ostream& file) const {
   std::vector<Line> lines;
   for (const Change& one : recorded_clock_) lines.push_back({one.at, '!', one.level});
   for (const Change& one : recorded_direction_) lines.push_back({one.at, '#', one.level});
-  bool last = true;
+  for (const Change& one : recorded_out_) lines.push_back({one.at, '>', one.level});
   for (const Change& one : levels_) {
-    if (one.at == Time::min() || std::exchange(last, one.level) == one.level) continue;
-    lines.push_back({one.at + fault.delay, '"', one.level});
+    if (one.at != Time::min()) lines.push_back({one.at + fault.delay, '<', one.level});
   }
   std::stable_sort(lines.begin(), lines.end(), [](const Line& one, const Line& other) { return one.at < other.at; });
   file << "$timescale 1 ns $end\n$scope module line $end\n$var wire 1 ! clock $end\n$var wire 1 \" data $end\n"
           "$var wire 1 # direction $end\n$upscope $end\n$enddefinitions $end\n#0\n1!\n1\"\n0#\n";
-  if (lines.empty()) return;
-  const Time begin = lines.front().at - 100us;  // the line rests before the first edge
-  for (const Line& one : lines) file << '#' << (one.at - begin).count() << '\n' << one.level << one.wire << '\n';
+  if (recorded_clock_.empty()) return;
+  const Time begin = recorded_clock_.front().at - 100us;  // the line rests before the first edge
+  bool last = true, out = false, in = true, drives = false;
+  for (const Line& one : lines) {
+    if (one.wire == '>') out = one.level;
+    if (one.wire == '<') in = one.level;
+    if (one.wire == '#') drives = one.level;
+    if (one.at < begin) continue;  // the levels at which the port left the pins when it opened
+    const auto put = [&](char wire, bool level) {
+      file << '#' << (one.at - begin).count() << '\n' << level << wire << '\n';
+    };
+    if (one.wire == '!' || one.wire == '#') put(one.wire, one.level);
+    const bool data = drives ? out : in;
+    if (std::exchange(last, data) != data) put('"', data);
+  }
   file << '#' << (lines.back().at - begin + 100us).count() << '\n';
 }
 

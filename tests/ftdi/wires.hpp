@@ -38,7 +38,8 @@ class EncoderWires final : public Wires {
 
   /// Starts to keep all changes, for `write_vcd`.
   void record() { records_ = true; }
-  /// Writes clock and data as at the chip's pins, and the direction, as a value change dump in steps of a nanosecond.
+  /// Writes the clock at the chip's pin, the data of host and encoder on their pair, and the direction, as a value change
+  /// dump in steps of a nanosecond.
   void write_vcd(std::ostream& file) const;
 
  private:
@@ -80,7 +81,7 @@ class EncoderWires final : public Wires {
   bool was_output_ = false;
 
   bool records_ = false;
-  std::vector<Change> recorded_clock_, recorded_direction_;
+  std::vector<Change> recorded_clock_, recorded_direction_, recorded_out_;
 };
 
 }  // namespace absenc::ftdi
