@@ -29,7 +29,7 @@ class TransferPort : public Port<std::uint8_t> {
   [[nodiscard]] std::uint32_t clock_rate() const { return used_rate_ != 0 ? used_rate_ : set_rate(); }
 
  protected:
-  /// What a transfer has received: the items of an SPI link, or the bits of a clocked one, packed MSB first.
+  /// Result of a transfer. Its content is the items of an SPI link, or the bits of a clocked link, packed MSB first.
   struct TransferResult {
     std::vector<std::uint8_t> items{};
     std::size_t bits = 0;   // number of bits of a clocked link

@@ -12,7 +12,7 @@
 
 namespace absenc::ftdi {
 
-/// What is connected to the pins ADBUS0 to ADBUS7.
+/// The circuit at the pins ADBUS0 to ADBUS7.
 struct Wires {
   virtual ~Wires() = default;
   /// Processes new levels of the pins; those that are no `outputs` are not driven by the chip.
@@ -32,7 +32,7 @@ class Mpsse {
 
   /// Switches the engine off and on: all pins are inputs, all settings as after reset, nothing waits.
   void reset();
-  /// Drops commands that were not complete (`in`), and replies that were not taken (`out`).
+  /// Drops incomplete commands if `commands`, and replies that were not taken if `replies`.
   void purge(bool commands, bool replies);
   /// Executes `commands` from the host, of which a command may continue in the next call; not before `now`.
   void take(Bytes commands, Time now);

@@ -16,7 +16,7 @@ inline constexpr auto conditions = std::array{
     Condition{"temperature", "degC", "inside the encoder", -40, 125, 30},
 };
 
-/// Rules for hosts that the virtual encoder checks. The words are those of the clauses.
+/// Rules for hosts that the virtual encoder checks.
 namespace rules {
 /// Pause that the encoder needs after an exchange.
 inline constexpr std::string_view recovery = "clocked before the recovery time has passed";

@@ -72,6 +72,11 @@ enum class ModeCommand : std::uint8_t {
 /// Returns whether the reply has a position.
 [[nodiscard]] constexpr bool has_position(ModeCommand code) { return code == ModeCommand::position || is_22(code); }
 
+/// Returns the mode command that reads a position from an encoder with this format.
+[[nodiscard]] constexpr ModeCommand position_command(const Format& format) {
+  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
+}
+
 /// A request: mode command with its parameters or its supplement.
 struct Request {
   ModeCommand code = ModeCommand::position;  ///< Mode command.

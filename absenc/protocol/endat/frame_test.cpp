@@ -78,7 +78,7 @@ TEST(EndatFrame, FindsHostsBitsInABurst) {
   EXPECT_EQ(end - start, 1 + reply_size(format, request.code));
 }
 
-// README.md, "What the checksum betrays": the least number of wrong bits that the CRC may miss, by the number of bits
+// README.md, section "Checksum": the least number of wrong bits that the CRC may miss, by the number of bits
 // that it covers, and the share of such patterns.
 TEST(EndatFrame, ChecksumBetraysEveryOddNumberOfWrongBits) {
   for (const unsigned covered : {14u, 26u, 27u, 38u, 39u, 50u, 24u}) {

@@ -73,10 +73,7 @@ constexpr std::array<Argument, 2> test_arguments{
 constexpr std::array<Argument, 2> communicate_arguments{
     {{"port", "address of the encoder", 0, 255}, {"instruction", "16 bits", 0, 0xFFFF}}};
 
-constexpr ModeCommand code_of_position(const Format& format) {
-  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
-}
-constexpr Request ask_for_position(const Format& format) { return {.code = code_of_position(format)}; }
+constexpr Request ask_for_position(const Format& format) { return {.code = position_command(format)}; }
 constexpr Request ask_for_position_with(const Format& format, Arguments) { return ask_for_position(format); }
 constexpr Request ask_for_test_values(const Format&) { return {.code = ModeCommand::test_values}; }
 template <ModeCommand code>
