@@ -3,6 +3,7 @@
 if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "ABSENC_FUZZ needs clang: cmake --preset sanitize")
 endif()
+pkg_check_modules(libzip REQUIRED libzip)  # writes archives for sigrok_fuzz
 add_custom_target(fuzzers)
 
 file(GLOB_RECURSE fuzz_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/absenc/*_fuzz.cpp"
@@ -12,7 +13,7 @@ foreach(source IN LISTS fuzz_sources)
   add_executable(${name} "${source}")
   absenc_settings(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/fuzzers")
-  target_link_libraries(${name} PRIVATE absenc::absenc absenc::capture)
+  target_link_libraries(${name} PRIVATE absenc::absenc absenc::capture ${libzip_LIBRARIES})
   target_link_options(${name} PRIVATE -fsanitize=fuzzer)
   if(name STREQUAL "units_fuzz")
     target_sources(${name} PRIVATE tests/kit/frames.cpp)

@@ -47,6 +47,10 @@ if(TARGET absenc-hdf5)
   absenc_pkgconfig(absenc-hdf5 "HDF5 for absenc-recording" "absenc-recording ${same}" absenc-hdf5
                    ${absenc_hdf5_libraries})
 endif()
+if(TARGET absenc-ftdi)
+  absenc_pkgconfig(absenc-ftdi "The clock of an FTDI chip for absenc-client" "absenc-client ${same}" absenc-ftdi
+                   ${ftdi_LIBRARIES})
+endif()
 if(TARGET absenc-gpio)
   absenc_pkgconfig(absenc-gpio "Pulses on GPIO lines for absenc-client" "absenc-client ${same}" absenc-gpio
                    ${gpiod_LIBRARIES})
@@ -57,6 +61,9 @@ install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT 
 # The man page and the bash completion are written by a program that links the tables of the command.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
+  if(TARGET absenc-ftdi)
+    install(FILES cmake/debian/60-absenc-ftdi.rules DESTINATION lib/udev/rules.d COMPONENT absenc)
+  endif()
   if(TARGET absenc-serve)
     install(TARGETS absenc-serve DESTINATION lib/absenc COMPONENT absenc-serve)
     install(FILES cmake/debian/absenc.service DESTINATION lib/systemd/system COMPONENT absenc-serve)

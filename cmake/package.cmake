@@ -58,9 +58,9 @@ absenc_package(libabsenc-dev libdevel "${PROJECT_DESCRIPTION} (development files
   "This package holds the static libraries with their headers, and the files for"
   "CMake and pkg-config.")
 if(TARGET absenc-client)
-  # absenc::client needs none of these: they are for absenc::captures, absenc::gpio and absenc::hdf5
+  # absenc::client needs none of these: they are for absenc::captures, absenc::ftdi, absenc::gpio and absenc::hdf5
   set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SUGGESTS
-      "libdeflate-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libminizip-dev")
+      "libdeflate-dev, libftdi1-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libminizip-dev")
 endif()
 
 if(TARGET absenc-python)

@@ -13,8 +13,9 @@ set_target_properties(absenc-python PROPERTIES OUTPUT_NAME _absenc LIBRARY_OUTPU
 target_include_directories(absenc-python PRIVATE "${PROJECT_SOURCE_DIR}")
 target_compile_definitions(absenc-python PRIVATE ABSENC_VERSION="${PROJECT_VERSION}")
 target_link_libraries(absenc-python PRIVATE absenc::configuration absenc::captures absenc::recording ${absenc_fmt}
-                                            $<TARGET_NAME_IF_EXISTS:absenc-gpio> $<TARGET_NAME_IF_EXISTS:absenc-hdf5>)
-foreach(part IN ITEMS GPIO HDF5)
+                                            $<TARGET_NAME_IF_EXISTS:absenc-ftdi> $<TARGET_NAME_IF_EXISTS:absenc-gpio>
+                                            $<TARGET_NAME_IF_EXISTS:absenc-hdf5>)
+foreach(part IN ITEMS FTDI GPIO HDF5)
   if(ABSENC_${part})
     target_compile_definitions(absenc-python PRIVATE ABSENC_${part})
   endif()

@@ -7,7 +7,8 @@ set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
 # Folders whose sources belong to libraries of their own, because they need libraries of the system.
-set(absenc_separate_folders absenc/os/linux/cuse absenc/os/linux/without_cuse absenc/os/linux/gpio)
+set(absenc_separate_folders absenc/os/linux/cuse absenc/os/linux/without_cuse absenc/os/linux/ftdi
+    absenc/os/linux/gpio)
 
 # Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
 # in the separate folders are included only if that folder is given.

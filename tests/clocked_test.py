@@ -90,12 +90,12 @@ class VirtualClockedEncoder(Case):
 
 class SpiAddress(Case):
     def test_refuses_wrong_link(self):
-        for encoder, words in [("ssi:/dev/ttyUSB0", ["does not go over a serial port", "write ssi:spi:/dev/spidev"]),
-                               ("biss:tcp:host:4001", ["does not go over TCP", "write biss:spi:/dev/spidev"]),
+        for encoder, words in [("ssi:/dev/ttyUSB0", ["does not go over a serial port", "write ssi:ftdi, ssi:spi:/dev/spidev"]),
+                               ("biss:tcp:host:4001", ["does not go over TCP", "write biss:ftdi, biss:spi:/dev/spidev"]),
                                ("tformat:spi:/dev/spidev0.0", ["does not go over an SPI controller", "write tformat:/"]),
                                ("e201:spi:/dev/spidev0.0", ["does not go over an SPI controller", "write e201:/"]),
-                               ("ssi:spi:", ["does not say which SPI device", "write ssi:spi:/dev/spidev"]),
-                               ("ssi", ["does not say where", "write ssi:spi:/dev/spidev", "or sim:ssi"]),
+                               ("ssi:spi:", ["does not say which SPI device", "write ssi:ftdi, ssi:spi:/dev/spidev"]),
+                               ("ssi", ["does not say where", "write ssi:ftdi, ssi:spi:/dev/spidev", "or sim:ssi"]),
                                ("ssi:spi:/dev/spidev0.0?baud=9600", ["baud", "it is for: serial"]),
                                ("ssi:spi:/dev/spidev0.0?echo=on", ["echo", "it is for: serial, tcp, sim"]),
                                ("ssi:spi:/dev/spidev0.0?speed=fast", ["speed", '"fast"']),
@@ -140,8 +140,8 @@ class SpiAddress(Case):
     def test_help_names_options(self):
         self.assertIn("ssi:spi:/dev/spidev0.0", absenc("--help").stdout)
         listed = absenc("list", "ssi").stdout
-        self.assertRegex(listed, r"speed=HZ +spi ")
-        self.assertRegex(listed, r"spi_mode=0\.\.3 +spi ")
+        self.assertRegex(listed, r"speed=HZ +spi, ftdi ")
+        self.assertRegex(listed, r"spi_mode=0\.\.3 +spi, ftdi ")
 
 
 

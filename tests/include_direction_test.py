@@ -32,6 +32,7 @@ FREESTANDING_HEADERS = set(
 SYSTEMS = ("linux", "windows")
 # Layers in which every header is public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
+PUBLIC_IN_OS = {Path("absenc/os") / name for name in ("error.hpp", "ftdi.hpp", "gpio.hpp")}
 # Headers of other libraries that take long to compile.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
@@ -74,7 +75,7 @@ def is_public(path):
     if path.suffix != ".hpp" or path.parts[0] != "absenc" or is_test(path):
         return False
     in_client = path.parts[1] == "client" and len(path.parts) == 3
-    return path.parts[1] in WHOLLY_PUBLIC or in_client or path in (Path("absenc/os/error.hpp"), Path("absenc/os/gpio.hpp"))
+    return path.parts[1] in WHOLLY_PUBLIC or in_client or path in PUBLIC_IN_OS
 
 
 def layer_fault(root, path, target):
@@ -108,7 +109,7 @@ def system_fault(path, header):
         return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
     if is_public(path) and re.search(r"[/.]", header):
         return "is no header of C++: not for a public header"
-    of_system = system_of(path) or path.parts[0] == "bench"
+    of_system = system_of(path) or path.parts[0] == "bench" or path.parts[:2] == ("tests", "vm")
     return "belongs into a folder of absenc/os" if OS_HEADER.search(header) and not of_system else None
 
 

@@ -24,13 +24,13 @@ GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").gl
 
 # The libraries in the order in which each needs those before it; absenc::client is all that reads an encoder.
 PARTS = ("absenc", "absenc-os", "absenc-search", "absenc-client", "absenc-configuration", "absenc-capture",
-         "absenc-captures", "absenc-recording", "absenc-hdf5", "absenc-gpio")
+         "absenc-captures", "absenc-recording", "absenc-hdf5", "absenc-ftdi", "absenc-gpio")
 PKG_CONFIG = ("absenc", "absenc-client", "absenc-configuration", "absenc-captures", "absenc-recording", "absenc-hdf5",
-              "absenc-gpio")
+              "absenc-ftdi", "absenc-gpio")
 # Shared libraries of a program that links only absenc::client: those of C++ and C.
 STANDARD = {"linux-vdso", "libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86-64", "ld-linux-aarch64"}
 # Names that the symbols of such a program must not contain, because they are from other libraries.
-FOREIGN = re.compile(r"nlohmann|toml::|\bH5[A-Z]|\bhwy::|\b(zip|unz)[A-Z]|libdeflate|\bgpiod_line_find")
+FOREIGN = re.compile(r"nlohmann|toml::|\bH5[A-Z]|\bhwy::|\b(zip|unz)[A-Z]|libdeflate|\bftdi_usb_open|\bgpiod_line_find")
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
 # Expected output of read_by_name: it prints positions, then the speed, as soon as enough positions for an average were
@@ -145,6 +145,7 @@ EXTENDED = r"""
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/hdf5.hpp"
 #include "absenc/client/recording.hpp"
+#include "absenc/os/ftdi.hpp"
 #include "absenc/os/gpio.hpp"
 
 using namespace absenc;
@@ -192,7 +193,8 @@ find_package(absenc {VERSION} REQUIRED)
 add_executable(by_name {BY_NAME})
 target_link_libraries(by_name PRIVATE absenc::client)
 add_executable(extended extended.cpp)
-target_link_libraries(extended PRIVATE absenc::configuration absenc::captures absenc::recording absenc::hdf5 absenc::gpio)
+target_link_libraries(extended PRIVATE absenc::configuration absenc::captures absenc::recording absenc::hdf5 absenc::ftdi
+                      absenc::gpio)
 add_executable(firmware firmware.cpp)
 target_link_libraries(firmware PRIVATE absenc::absenc)
 """
@@ -241,7 +243,7 @@ def pkg_config(root, *arguments):
 def public_headers():
     """Returns the paths, below the installation folder, of the public headers."""
     patterns = [f"{layer}/**/*.hpp" for layer in ("core", "link", "protocol", "host", "sim")]
-    patterns += ["client/*.hpp", "os/error.hpp", "os/gpio.hpp"]
+    patterns += ["client/*.hpp", "os/error.hpp", "os/ftdi.hpp", "os/gpio.hpp"]
     sources = [path for pattern in patterns for path in (SOURCE / "absenc").glob(pattern)]
     return {f"include/{path.relative_to(SOURCE)}" for path in sources if "test" not in path.name}
 
@@ -279,7 +281,7 @@ class Installed(Case):
             "lib/absenc-serve", "lib/hdf5.so",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
-            "share/doc/absenc/LICENSE", *SERVE_DOCUMENTS, "lib/absenc.service", *GUIDE})
+            "share/doc/absenc/LICENSE", *SERVE_DOCUMENTS, "lib/absenc.service", "lib/60-absenc-ftdi.rules", *GUIDE})
         self.assertEqual(headers, public_headers())
 
     def test_headers_include_only_installed_ones(self):
@@ -373,7 +375,7 @@ class Installed(Case):
         extended = self.folder / "extended.cpp"
         extended.write_text(EXTENDED)
         self.assert_is_extended(self.program("extended_by_pkg_config", extended, "absenc-configuration", "absenc-captures",
-                                             "absenc-hdf5", "absenc-gpio"), self.folder)
+                                             "absenc-hdf5", "absenc-ftdi", "absenc-gpio"), self.folder)
         for library in PKG_CONFIG:
             self.assertEqual(pkg_config(self.root, "--modversion", library), [VERSION])
         self.assertEqual([flag for flag in pkg_config(self.root, "--libs", "absenc-client") if flag.startswith("-l")],
@@ -509,7 +511,7 @@ class Completion(Case):
         self.assertEqual(self.complete("read", "--json", "tf"), ["compopt -o nospace", "tformat:"])
         self.assertEqual(self.complete("read", "sim", ":", "tf"), ["tformat"])
         self.assertEqual(self.complete("read", '"sim:tf'), ["sim:tformat"])
-        self.assertEqual(self.complete("read", "tformat", ":"), ["compopt -o nospace", "/", "slcan:", "spi:", "tcp:"])
+        self.assertEqual(self.complete("read", "tformat", ":"), ["compopt -o nospace", "/", "ftdi", "slcan:", "spi:", "tcp:"])
         (self.folder / "tty one").touch()
         for path in ("tty", "tty o"):
             with self.subTest(path):
@@ -592,7 +594,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(set.union(*held.values()), installed | added)
         self.assertIn("lib/python3/dist-packages/absenc/py.typed", held["python3-absenc"])
         files = {name: {path for path in paths if not path.startswith("share/")} for name, paths in held.items()}
-        self.assertEqual(files["absenc"], {"bin/absenc"})
+        self.assertEqual(files["absenc"], {"bin/absenc", "lib/udev/rules.d/60-absenc-ftdi.rules"})
         self.assertEqual(files["absenc-serve"], {"lib/absenc/absenc-serve", "lib/systemd/system/absenc.service"})
         self.assertEqual(files["absenc-hdf5"], {"lib/absenc/plugins/hdf5.so"})
         self.assertTrue(SERVE_DOCUMENTS < held["absenc-serve"])

@@ -120,9 +120,10 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
   }
   for (const Option& option : unit.options) {
     if (option.name != command.changes_option) continue;
-    for (const std::string_view choice : option.choices) {
+    for (std::size_t i = 0; i < option.choices.size(); ++i) {
       candidates.push_back(candidates.front());
-      candidates.back().front() = std::stoll(std::string(choice));
+      // The argument is the choice if that is a number, else its index.
+      candidates.back().front() = parse_number(option.choices[i]).value_or(static_cast<std::int64_t>(i));
     }
   }
   if (command.verb == Verb::memory_write) {

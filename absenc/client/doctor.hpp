@@ -40,6 +40,8 @@ enum class FindingKind : std::uint8_t {
   wrong_spi_mode,
   clock_too_fast,
   miso_stuck,
+  transceiver_missing,
+  clock_range,
   wrong_echo,
   wrong_address,
   other_protocol,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absenc/core/bit_view.hpp"
+#include "absenc/os/spi_choice.hpp"
 
 namespace absenc::os {
 
@@ -17,7 +18,6 @@ constexpr Time deselected_time = std::chrono::microseconds(10);
 // Greatest number of bytes of one selection that are passed to the device; no device reads more.
 constexpr std::size_t most_received = 4096;
 
-constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }
 
 std::uint8_t mask_of(std::size_t bit, bool lsb_first) {

@@ -4,13 +4,12 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "absenc/link/port.hpp"
 #include "absenc/os/descriptor.hpp"
-#include "absenc/os/waiting.hpp"
+#include "absenc/os/spi_choice.hpp"
+#include "absenc/os/transfer_port.hpp"
 
 namespace absenc::os {
 
@@ -24,38 +23,26 @@ struct SpiKernel {
 };
 [[nodiscard]] SpiKernel& system_kernel();
 
-/// Controller settings chosen by the user, which override those of the protocol.
-struct SpiChoice {
-  std::optional<std::uint32_t> speed;  // clock rate in Hz
-  std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
-};
-
 /// A port on an SPI controller, locked against other programs that use flock(2). On clocked encoders (SSI, BiSS) a
 /// transfer has up to seven additional clocks, because a controller clocks whole bytes. `begin` and `wait` throw
 /// Failure, Interrupted or Ended.
-class SpiPort final : public Port<std::uint8_t> {
+class SpiPort final : public TransferPort {
  public:
   /// Opens the controller at `path`, /dev/spidevB.C; `kind`: spi or clocked, else throws invalid_argument. `kernel`
   /// must outlive the port. Throws Failure.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
-  SpiPort(const SpiPort&) = delete;
-  SpiPort& operator=(const SpiPort&) = delete;
-
-  [[nodiscard]] Time now() override;
-  void begin(const Step<std::uint8_t>& step) override;
-  [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) override;
 
   /// Returns the settings that the controller uses.
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
 
  private:
-  void transfer(const Step<std::uint8_t>& step);
+  void exchange(const Step<std::uint8_t>& step, TransferResult& received) override;
+  [[nodiscard]] std::uint32_t set_rate() const override { return settings_.rate; }
+  void change_rate(std::uint32_t rate) override;
   void send_message(bool with_output);
-  void extract_bits(std::size_t bits);
 
   void apply(LineSettings settings);
-  void change_rate(std::uint32_t rate);
   void set_mode(std::uint8_t mode);
   void hold_low(Time until);
   void set_word();
@@ -63,7 +50,6 @@ class SpiPort final : public Port<std::uint8_t> {
   int control(unsigned long request, void* argument) { return kernel_->control(descriptor_.get(), request, argument); }
 
   std::string path_;
-  LinkKind kind_;
   SpiChoice choice_;
   SpiKernel* kernel_;
   Descriptor descriptor_;
@@ -73,14 +59,6 @@ class SpiPort final : public Port<std::uint8_t> {
 
   std::vector<std::uint8_t> out_;
   std::vector<std::uint8_t> in_;
-  Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};  // end of the last transfer
-  // duration of the system call of the last transfer: the transfer may have ended earlier by up to this
-  Time sent_late_{};
-  bool sent_pending_ = false;      // whether the event `sent` is still to be reported
-  bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
-  // whether the last transfer of a clocked encoder had idle clocks, and the data line was low in all of them
-  bool idle_low_ = false;
 };
 
 /// Returns the paths of all spidev devices, "/dev/spidev0.0" and so on, sorted.

@@ -2,6 +2,9 @@
 // The extension module absenc._absenc, which absenc/*.py is based on.
 #include "absenc/client/configuration.hpp"  // names of absenc.toml
 #include "python/src/bind.hpp"
+#ifdef ABSENC_FTDI
+#include "absenc/os/ftdi.hpp"  // ports may use FTDI chips
+#endif
 #ifdef ABSENC_GPIO
 #include "absenc/os/gpio.hpp"  // ports may use GPIO lines
 #endif

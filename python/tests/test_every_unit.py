@@ -65,14 +65,19 @@ def test_encodes_and_decodes_requests(unit):
             continue  # with the options of the first model the command cannot be encoded
         if request:
             requests.append(request)
-    # clocked links have no request, because the clock itself requests a position
+    # an encoder on a clocked link has no request, because the clock itself requests a position
     assert requests or unit.link == "clocked"
     for request in requests:
         assert isinstance(request, bytes if unit.link not in TEXT_LINKS else str)
         unit.decode("", request=request)
         if unit.link == "clocked":
             continue  # the request of a clocked link is only a sequence of bits, so none is invalid
-        other = "7" + request[1:] if unit.link == "can" else b"\xff" + request[1:] + b"\xff"
+        if unit.link == "can":
+            other = "7" + request[1:]
+        elif unit.link == "clocked_bidirectional":
+            other = "1111 1111"  # no mode command begins with 1
+        else:
+            other = b"\xff" + request[1:] + b"\xff"
         with pytest.raises(absenc.EncoderError):
             unit.decode("", request=other)
 

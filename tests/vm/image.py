@@ -19,9 +19,10 @@ CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.
 
 # Kernel modules for the tests, including those that the kernel itself loads on demand.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
-           "usb_f_obex", "g_serial"]
+           "usb_f_obex", "g_serial", "usb_f_fs", "ftdi_sio"]
 # Programs of this computer that are copied into the initramfs.
-PROGRAMS = ["candump", "cangen", "cansend", "ip", "slcand", "spi-config", "spi-pipe"]
+PROGRAMS = ["candump", "cangen", "cansend", "flashrom", "ip", "slcand", "spi-config", "spi-pipe"]
+PACKAGES = "/usr/lib/python3/dist-packages"  # where Debian's packages install modules
 TOOLS = ["apt-cache", "apt-get", "dpkg-deb", "tar", "xz", "modinfo", "ldd", "busybox", "cpio", "qemu-system-x86_64"]
 
 
@@ -210,9 +211,12 @@ def build(absenc, patterns, folder):
         image.put(path, "/modules/" + os.path.basename(path))
     image.put(program("busybox"), "/bin/busybox")
     image.put_with_libraries(absenc, "/bin/absenc")
-    image.put_with_libraries(os.path.join(os.path.dirname(absenc), "../vm/can_emulation"), "/bin/can_emulation")
+    for name in ("can_emulation", "ftdi_device"):
+        image.put_with_libraries(os.path.join(os.path.dirname(absenc), "../vm", name), f"/bin/{name}")
     for name in PROGRAMS:
         image.put_with_libraries(program(name), f"/bin/{name}")
+    for path in glob.glob(f"{PACKAGES}/*ftdi1*"):  # a module of Debian's Python, of which tests import the C part
+        image.put_with_libraries(path)
     scripts = glob.glob(os.path.join(TESTS, "vm/*_test.py")) + [os.path.join(TESTS, "vm/guest.py")]
     for path in python_files(scripts):
         image.put_with_libraries(path, path.replace(TESTS, "/tests"))

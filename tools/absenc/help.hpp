@@ -14,10 +14,11 @@ namespace absenc::tool {
 inline constexpr std::string_view about =
     "absolute encoders - read them, set them up, emulate them, decode what was captured";
 
-inline constexpr std::array<Example, 5> encoder_examples{{
+inline constexpr std::array<Example, 6> encoder_examples{{
     {"tformat:/dev/ttyUSB0", "a serial port"},
     {"tformat:tcp:192.168.1.20:4001", "a serial server on the network"},
     {"ssi:spi:/dev/spidev0.0", "an SPI controller, which also clocks SSI and BiSS"},
+    {"biss:ftdi", "an FT232H with an RS-422 transceiver: ftdi:SERIAL picks a chip, ftdi:SERIAL/B a channel"},
     {"sim:tformat", "a virtual encoder inside the command: no hardware needed"},
     {"elbow", "a name from absenc.toml: see `absenc list --help`"},
 }};

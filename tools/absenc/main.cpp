@@ -23,6 +23,9 @@
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/verbs/run.hpp"
 #include "tools/absenc/version.hpp"
+#ifdef ABSENC_FTDI
+#include "absenc/os/ftdi.hpp"  // ports may use FTDI chips
+#endif
 #ifdef ABSENC_GPIO
 #include "absenc/os/gpio.hpp"  // ports may use GPIO lines
 #endif

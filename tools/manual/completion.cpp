@@ -68,9 +68,9 @@ _absenc_model_setting() {
 
 # A port without a protocol, or a capture.
 _absenc_where() {
-  local prefixes='slcan: spi: tcp:'
+  local prefixes='ftdi slcan: spi: tcp:'
   case $1 in
-    tcp:*) ;;
+    tcp:* | ftdi*) ;;
     spi:* | slcan:*)
       _absenc_file "${1#*:}"
       COMPREPLY=("${COMPREPLY[@]/#/"${1%%:*}:"}")
@@ -98,7 +98,7 @@ _absenc_encoder() {
         _absenc_file "$place"
       else
         compopt -o nospace
-        _absenc_words '/ slcan: spi: tcp:' "$place"
+        _absenc_words '/ ftdi slcan: spi: tcp:' "$place"
       fi
       COMPREPLY=("${COMPREPLY[@]/#/"${1%%:*}:"}")
       ;;

@@ -86,6 +86,35 @@ class Truth {
       }
     }
   }
+  // Adds a burst of a line whose data turns: the unit tells which bits are the host's.
+  void add_both_ways(const Burst& burst, const Unit& unit, const Options& options) {
+    std::vector<bool> bits;
+    for (std::size_t i = 1; i < burst.bits; ++i) bits.push_back((burst.in[i / 8] >> (7 - i % 8) & 1) != 0);
+    if (burst.has_last) bits.push_back(burst.last);
+    BitBuffer<4096> line;
+    for (const bool bit : bits) line.append(bit ? 1 : 0, 1);
+    const BitRanges ranges = unit.host_bits(options, {.bytes = line.bytes(), .bits = line.size()});
+    BitBuffer<4096> request;
+    BitBuffer<4096> reply;
+    for (std::size_t i = 0; i < bits.size(); ++i) {
+      bool by_host = false;
+      for (std::size_t k = 0; k < ranges.size(); ++k) {
+        by_host = by_host || (i >= ranges[k].first && i < ranges[k].first + ranges[k].count);
+      }
+      (by_host ? request : reply).append(bits[i] ? 1 : 0, 1);
+    }
+    const Error error = judge_.decode({.bytes = request.bytes(), .bits = request.size()},
+                                      {.bytes = reply.bytes(), .bits = reply.size()});
+    expected.push_back({Kind::exchange,
+                        Remark::none,
+                        error,
+                        burst.begin,
+                        burst.end,
+                        Wire(request.bytes().begin(), request.bytes().end()),
+                        Wire(reply.bytes().begin(), reply.bytes().end()),
+                        reading(error),
+                        {}});
+  }
   void add(const Burst& burst, const Unit& unit) {
     if (control_.settle(false)) add(control_.annotation(judge_));
     std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
@@ -439,7 +468,11 @@ TEST_P(Bursts, EveryExchange) {
   BurstAnnotator annotator(unit, options, collector);
   while (truth.expected.size() < 5000) {
     for (const Burst& burst : talker.talk().bursts) {
-      truth.add(burst, unit);
+      if (unit.link == LinkKind::clocked_bidirectional) {
+        truth.add_both_ways(burst, unit, options);
+      } else {
+        truth.add(burst, unit);
+      }
       annotator.put(burst);
     }
   }

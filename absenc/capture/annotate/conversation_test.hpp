@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absenc/capture/signal.hpp"
+#include "absenc/core/bit_view.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/faults.hpp"
@@ -130,7 +131,27 @@ class Talker {
     }
   }
 
+  // A burst on a bidirectional link begins with a sample of the idle line; its last bit follows the last clock.
+  void record_both_ways(const sim::Line<std::uint8_t>::Transfer& transfer) {
+    if (transfer.goes_on_from == never) {
+      Burst burst{};
+      burst.begin = static_cast<Tick>(transfer.start.count());
+      burst.has_last = burst.last = true;
+      record_.bursts.push_back(burst);
+    }
+    Burst& burst = record_.bursts.back();
+    burst.end = static_cast<Tick>(transfer.end.count());
+    for (std::size_t i = 0; i < transfer.bits; ++i) {
+      if (burst.bits % 8 == 0) burst.in.push_back(0);
+      if (burst.last) burst.in.back() = static_cast<std::uint8_t>(burst.in.back() | 0x80u >> burst.bits % 8);
+      ++burst.bits;
+      burst.last = i < transfer.out_bits ? BitView{transfer.out, transfer.out_bits}[i]
+                                         : BitView{transfer.in, transfer.bits}[i - transfer.out_bits];
+    }
+  }
+
   void record(const sim::Line<std::uint8_t>::Transfer& transfer) {
+    if (unit_.link == LinkKind::clocked_bidirectional) return record_both_ways(transfer);
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
     const bool held_low = transfer.held_low != never;
     if (held_low) {  // the rise of the clock line before the word samples one bit of the idle line

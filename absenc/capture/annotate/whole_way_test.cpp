@@ -83,7 +83,8 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
       return true;
     };
     if (clocked) {
-      ClockedLine wires{.rising = line.spi_mode == 0 || line.spi_mode == 3};
+      const bool turns = unit.link == LinkKind::clocked_bidirectional;
+      ClockedLine wires{.rising = !turns && (line.spi_mode == 0 || line.spi_mode == 3), .low_goes_on = turns};
       const bool spi = unit.link == LinkKind::spi;
       wires.clock = channel(spi ? "sck" : "clock");
       wires.in = channel(spi ? "miso" : "data");

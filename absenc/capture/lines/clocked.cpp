@@ -133,15 +133,17 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// Takes the samples behind the last clock change that are due before `until`, as far as the format asks for them.
+// Takes the samples behind the last clock change that are due before `until`, as far as the format asks for them. The
+// clock of a line whose exchanges have different rates is measured in the burst itself.
 void ClockedDecoder::sample_last_bits(Tick until) {
   if (format_.settle == 0 || !has_in_) return;
-  if (!burst_.has_last && last_ + format_.settle < until) {
-    burst_.last = in_.before(last_ + format_.settle);
+  const Tick half = format_.low_goes_on ? std::max<Tick>(half_, 1) : format_.settle;
+  if (!burst_.has_last && last_ + half < until) {
+    burst_.last = in_.before(last_ + half);
     burst_.has_last = true;
   }
   while (burst_.has_last && burst_.tail_bits < format_.tail) {
-    const Tick at = last_ + (2 * burst_.tail_bits + 3) * format_.settle;
+    const Tick at = last_ + (2 * burst_.tail_bits + 3) * half;
     if (at >= until) return;
     burst_.tail = burst_.tail << 1 | (in_.before(at) ? 1u : 0u);
     ++burst_.tail_bits;
@@ -157,7 +159,11 @@ void ClockedDecoder::detect_data_change(Tick until) {
 }
 
 bool ClockedDecoder::is_over(Tick rest) const {
-  if (format_.low_goes_on && !clock_.level) return false;
+  if (format_.low_goes_on) {
+    if (!clock_.level) return false;
+    // A pause between fast exchanges may be shorter than half a period of the clock of slow ones.
+    if (open_ && rest > 3 * half_) return true;
+  }
   return rest > format_.pause || (changed_ && rest > format_.change_pause);
 }
 
@@ -174,6 +180,7 @@ bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>
     if (!open_ && open(at, !seen_pause_, targets)) return true;
   }
   lone_ = open_ && at == burst_.begin;
+  half_ = at - last_;
   burst_.has_last = changed_ = false;
   burst_.tail = burst_.tail_bits = 0;
   clock_.step();

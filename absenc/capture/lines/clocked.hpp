@@ -107,6 +107,7 @@ class ClockedDecoder {
   Wire out_;
   Wire select_;
   Wire direction_;
+  Tick half_ = 0;  // time between the last two changes of the clock, in ticks
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;

@@ -272,7 +272,7 @@ void check_stranger_hosts(const EncoderAddress& address) {
     expect_none_kept(judged_sending([&] { return sent++ % 2 == 0 ? good : one; }), "every second one damaged");
   }
   for (const Unit* const other : all_units()) {
-    if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
+    if (carries_bits(other->link) || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
     // Skips empty requests, and requests of the other unit that the tested unit accepts, too.
     if (request.empty() || error_of(address, request) == Error::none) continue;

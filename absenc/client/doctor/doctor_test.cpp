@@ -137,6 +137,22 @@ std::vector<Fault> line_faults() {
                         return address.spi.speed.value_or(address.line.rate) <= address.line.rate / 4;
                       });
                     }});
+  faults.push_back({"transceiver_missing", [] {
+                      return examine_with("encolink-spi:ftdi", [](const EncoderAddress&) {
+                        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+                        port->answer = [](const ByteList& out) {
+                          return ByteList(std::max<std::size_t>(out.size(), 16), 0xFF);
+                        };
+                        Link link = link_to(std::move(port));
+                        link.is_data_driven = [] { return false; };
+                        return link;
+                      });
+                    }});
+  faults.push_back({"clock_range", [] {
+                      return examine_with("biss:ftdi", [](const EncoderAddress&) {
+                        return virtual_link(parse_address("sim:biss?singleturn=1234"));
+                      });
+                    }});
   faults.push_back({"miso_stuck", [] {
                       return examine_with("encolink-spi:spi:/dev/spidev0.0", [](const EncoderAddress&) {
                         auto port = std::make_shared<ScriptedPort<std::uint8_t>>();

@@ -40,6 +40,14 @@ constexpr Time longest_start = std::chrono::seconds(2);
 constexpr Time models_limit = std::chrono::seconds(3);
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(16);
+// Clocks that are tried, as multiples and divisors of the one that is set, the slowest first.
+struct Ratio {
+  std::uint32_t times, divisor;
+};
+constexpr std::array<Ratio, 7> swept{{{1, 8}, {1, 4}, {1, 2}, {1, 1}, {3, 2}, {2, 1}, {4, 1}}};
+constexpr std::uint32_t slowest_swept = 10'000;      // Hz
+constexpr std::uint32_t fastest_swept = 10'000'000;  // Hz, where the document states no limit
+constexpr std::int64_t resting_counts = 8;           // positions of a resting shaft differ by this at most
 
 bool is_serial(const EncoderAddress& address) {
   return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
@@ -101,6 +109,11 @@ class Doctor {
       seen_.port = address_.path;
       seen_.facts = surroundings_.facts(address_.path);
     }
+    if (address_.port_kind == PortKind::ftdi) {
+      tell("the data pin");
+      const Link link = surroundings_.open(address_);
+      if (link.is_data_driven) seen_.data_driven = link.is_data_driven();
+    }
     if (address_.unit->link == LinkKind::can) {
       look_over<CanFrame>();
     } else {
@@ -151,6 +164,7 @@ class Doctor {
     const bool may_be_settings = hardly_any_good(seen_.readings) && !seen_.never_silent && seen_.lateness == Time{};
     if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (address_.port_kind == PortKind::ftdi && any_good()) sweep_clock();
       if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
       if (address_.port_kind != PortKind::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal)
         ask_once_more();
@@ -255,6 +269,39 @@ class Doctor {
     Examiner<Item> examiner(address_, surroundings_.open(address_), choices_);
     examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
     examiner.conclude(seen_);
+  }
+
+  // Reads with slower and faster clocks, up to the fastest that the document allows. A reading is good if its position
+  // is also that of the readings before, provided that the shaft rested: SSI has no checksum.
+  void sweep_clock() {
+    const std::uint32_t set = address_.spi.speed.value_or(address_.line.rate);
+    const std::uint32_t limit = address_.line.highest_rate != 0 ? address_.line.highest_rate : fastest_swept;
+    std::optional<std::int64_t> least;
+    std::optional<std::int64_t> most;
+    for (const Attempted& one : seen_.readings) {
+      if (one.error != Error::none || !one.reading) continue;
+      least = std::min(least.value_or(position(one)), position(one));
+      most = std::max(most.value_or(position(one)), position(one));
+    }
+    const bool rests = least && *most - *least <= resting_counts;
+    for (const auto [times, divisor] : swept) {
+      const std::uint32_t rate = set / divisor * times;
+      if (rate > std::max(limit, set) || rate < slowest_swept) continue;
+      tell(fmt::format("speed={}", rate));
+      EncoderAddress other = address_;
+      other.spi.speed = rate;
+      std::vector<Attempted> attempts;
+      ask<std::uint8_t>(other, trial_readings, attempts);
+      const auto is_good = [&](const Attempted& one) {
+        const bool same = !rests || std::abs(position(one) - *least) <= 2 * resting_counts;
+        return one.error == Error::none && same;
+      };
+      const auto good = static_cast<std::size_t>(std::ranges::count_if(attempts, is_good));
+      if (!attempts.empty()) seen_.clocks.push_back({rate, good, attempts.size(), times == divisor});
+    }
+  }
+  [[nodiscard]] static std::int64_t position(const Attempted& one) {
+    return one.reading ? static_cast<std::int64_t>(one.reading->singleturn) : 0;
   }
 
   // Takes up to `count` readings with these settings, none before `earliest`, and returns their duration, 0 if the port

@@ -172,6 +172,40 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
   }
 }
 
+namespace {
+
+// A bit is sampled half a period after the edge at which the encoder changes it, so a clock that is too fast shows how
+// long the way from edge to data is. BiSS finds its start bit, so there a delay only shifts the bits by whole clocks.
+void judge_clocks(const Case& one, std::vector<Finding>& findings) {
+  const std::vector<ClockTrial>& clocks = one.seen.clocks;
+  const auto is_bad = [](const ClockTrial& trial) { return trial.good < trial.tried; };
+  const auto set = std::ranges::find_if(clocks, [](const ClockTrial& trial) { return trial.is_set; });
+  if (set == clocks.end() || is_bad(*set)) return;
+  const auto failed = std::find_if(set, clocks.end(), is_bad);
+  auto slowest = set;
+  while (slowest != clocks.begin() && !is_bad(*std::prev(slowest))) --slowest;
+  const ClockTrial& fastest = *std::prev(failed);
+  const auto half_ns = [](const ClockTrial& trial) { return 500'000'000 / trial.rate; };
+  std::string but;
+  const auto add = [&but](const ClockTrial& trial) {
+    but += fmt::format("{} {} of {} at {} Hz", but.empty() ? ", but only" : " and", trial.good, trial.tried, trial.rate);
+  };
+  if (slowest != clocks.begin()) add(*std::prev(slowest));
+  std::string cause = "no faster clock that was tried is too fast for encoder and cable";
+  std::string action = "keep the clock";
+  if (failed != clocks.end()) {
+    add(*failed);
+    cause =
+        fmt::format("from the edge of the clock to the data the way takes {} to {} ns: transceivers, cable, encoder",
+                    half_ns(*failed), half_ns(fastest));
+    action = fmt::format("set speed={} or less", fastest.rate);
+  }
+  findings.push_back(finding(FindingKind::clock_range,
+                             {fmt::format("{}", slowest->rate), fmt::format("{}", fastest.rate), but, cause, action}));
+}
+
+}  // namespace
+
 void judge_line(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.line_errors > 0 && one.unit.link == LinkKind::can) {
@@ -204,6 +238,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
   judge_slowness(one, findings);
+  judge_clocks(one, findings);
 }
 
 namespace {

@@ -59,8 +59,10 @@ std::optional<Finding> stuck_data(const Case& one, const All& all) {
       return !attempt.raw.empty() && std::all_of(attempt.raw.begin(), attempt.raw.end(), is_level);
     });
     const bool is_stuck = most(all, [](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
-    if (stuck || (is_stuck && level == 0xFF))
-      return finding(FindingKind::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
+    if (!stuck && !(is_stuck && level == 0xFF)) continue;
+    const bool no_transceiver = one.seen.data_driven == false;
+    return finding(no_transceiver ? FindingKind::transceiver_missing : FindingKind::miso_stuck,
+                   {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
   }
   return {};
 }

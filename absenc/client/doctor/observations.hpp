@@ -31,6 +31,14 @@ struct Trial {
   std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not
 };
 
+/// Readings with one clock rate.
+struct ClockTrial {
+  std::uint32_t rate = 0;  // Hz
+  std::size_t good = 0;    // readings without an error and, if the shaft rested, with the position of those before
+  std::size_t tried = 0;
+  bool is_set = false;  // whether this is the clock that the user has set
+};
+
 /// The reason why the port could not be opened, or was lost.
 struct Refusal {
   os::Failure::Kind kind{};
@@ -67,7 +75,9 @@ struct Observations {
   std::vector<std::uint8_t> overfull_example{};
   std::size_t most_behind = 0;  // greatest number of further bytes that followed a good reply
   std::vector<Trial> trials{};
-  host::EchoMode echo_said{};     // whether the adapter echoes requests, as the user has set it
+  std::vector<ClockTrial> clocks{};   // readings with other clock rates, the slowest first; empty: none were tried
+  std::optional<bool> data_driven{};  // whether something drives the data pin of the port; nothing: not known
+  host::EchoMode echo_said{};         // whether the adapter echoes requests, as the user has set it
   host::EchoMode echo{};          // whether the adapter echoes requests, as the user has set it or as it was detected
   std::optional<Time> latency{};  // latency of the connection, as the user has set it
   Time computer_late{};           // greatest delay of this computer during the readings (os::DelayWatch)

@@ -92,7 +92,10 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
         Other{finding_kind, fmt::format("{}={}", name, said), fmt::format("{}={}", name, set), address});
   };
   for (std::uint8_t other = 0; other < 4; ++other) {
-    if (other != mode) add(FindingKind::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
+    // An MPSSE has one way to sample for each level at which the clock rests.
+    const bool same =
+        address.port_kind == PortKind::ftdi ? (other & 1) != 0 || (other & 2) == (mode & 2) : other == mode;
+    if (!same) add(FindingKind::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
   }
   for (const std::uint32_t divisor : {2u, 4u, 8u, 16u}) {
     if (speed / divisor == 0) break;
@@ -166,7 +169,7 @@ LineSearch search_of(const EncoderAddress& address) {
 
 std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate) {
   std::vector<Other> others;
-  if (address.port_kind == PortKind::spi) add_spi(address, others);
+  if (address.port_kind == PortKind::spi || address.port_kind == PortKind::ftdi) add_spi(address, others);
   if (carries_characters(*address.unit) && address.echo != host::EchoMode::automatic) {
     const bool on = address.echo == host::EchoMode::on;
     others.push_back({FindingKind::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});

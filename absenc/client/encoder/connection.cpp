@@ -107,6 +107,10 @@ class ConnectionOn final : public Connection {
     return link_ != nullptr ? link_->link().notes : none;
   }
 
+  std::uint32_t clock_rate() const override {
+    return link_ != nullptr && link_->link().clock_rate ? link_->link().clock_rate() : 0;
+  }
+
   Outcome read(host::Take take) override {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));

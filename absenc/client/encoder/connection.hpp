@@ -42,6 +42,8 @@ class Connection {
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
+  /// Returns the clock rate in Hz of the last transfer; 0 if the port makes no clock, or is not connected.
+  [[nodiscard]] virtual std::uint32_t clock_rate() const = 0;
 
   // `read`, `run`, `trouble`, `lend` and `now` require an open connection.
 

@@ -227,7 +227,8 @@ class Search {
       return;
     }
     findings_.lines.insert(line);
-    if (medium_of(search_) == Medium::spi || !listen(one, unit)) one.ask();
+    const bool clocks = medium_of(search_) == Medium::spi || medium_of(search_) == Medium::ftdi;
+    if (clocks || !listen(one, unit)) one.ask();
     if (one.silent() && settings == search_.settings) silent_.push_back(&unit);
   }
 
@@ -343,7 +344,7 @@ LineSearch parse_search(std::string_view text) {
   if (first != "sim" && find_unit(first) == nullptr) return search;
   throw UsageError(
       fmt::format("\"{}\" says which protocol: `absenc read {}` reads it; to identify, give the port "
-                  "alone, as /dev/ttyUSB0, tcp:HOST:PORT or spi:/dev/spidev0.0",
+                  "alone, as /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0 or ftdi",
                   search.place, search.place));
 }
 

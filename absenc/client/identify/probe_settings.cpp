@@ -15,6 +15,7 @@ namespace absenc::client {
 Medium medium_of(const LineSearch& search) {
   const std::string& place = search.place;
   if (place.starts_with("spi:")) return Medium::spi;
+  if (is_ftdi_place(place)) return Medium::ftdi;
   if (place.starts_with("tcp:")) return Medium::tcp;
   // A place without '/' is no path, so it is the name of a CAN interface.
   return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Medium::can : Medium::serial;
@@ -24,7 +25,9 @@ bool fits(const Unit& unit, const LineSearch& search) {
   if (unit.line.data_bits > search.most_data_bits) return false;
   const Medium way = medium_of(search);
   if (way == Medium::can) return unit.link == LinkKind::can;
-  if (way == Medium::spi) return host_clocks(unit.link);
+  if (way == Medium::spi) return host_clocks(unit.link) && unit.link != LinkKind::clocked_bidirectional;
+  if (way == Medium::ftdi)
+    return carries_bits(unit.link) || (unit.link == LinkKind::spi && unit.line.spi_mode % 2 == 0);
   // A pseudo-terminal carries any bytes, but no UART has characters of more than 8 bits.
   if (way == Medium::serial && unit.line.data_bits > 8 && !os::is_pseudo_terminal(search.place)) return false;
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;

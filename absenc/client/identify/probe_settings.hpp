@@ -15,7 +15,7 @@ namespace absenc::client {
 
 using SettingTexts = std::vector<std::string>;  // settings, each as "address=3"
 
-enum class Medium : std::uint8_t { serial, tcp, spi, can };
+enum class Medium : std::uint8_t { serial, tcp, spi, ftdi, can };
 
 /// Returns the kind of port that is searched.
 [[nodiscard]] Medium medium_of(const LineSearch& search);

@@ -15,6 +15,7 @@
 #include "absenc/os/realtime.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/socketcan.hpp"
+#include "absenc/os/spi_port.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -178,20 +179,34 @@ std::string examples(const Unit& unit) {
   if (unit.link == LinkKind::can) {
     return fmt::format("{0}:{1}, {0}:slcan:/dev/ttyACM0 or sim:{0}", unit.id, first(os::can_interfaces(), "can0"));
   }
-  return fmt::format("{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"));
+  if (unit.link == LinkKind::clocked_bidirectional) return fmt::format("{0}:ftdi or sim:{0}", unit.id);
+  const std::string clocks = unit.link == LinkKind::clocked ? fmt::format("{}:ftdi, ", unit.id) : "";
+  return fmt::format("{2}{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"), clocks);
+}
+
+// Returns whether a port of this kind can carry the unit's kind of line, and what the port is in words.
+std::pair<bool, std::string_view> carries(PortKind place, const Unit& unit) {
+  switch (place) {
+    case PortKind::can:
+    case PortKind::slcan:
+      return {unit.link == LinkKind::can, "a CAN adapter"};
+    case PortKind::spi:  // a controller of Linux cannot turn the direction of a line
+      return {host_clocks(unit.link) && unit.link != LinkKind::clocked_bidirectional, "an SPI controller"};
+    case PortKind::ftdi:
+      return {host_clocks(unit.link), "the clock of an FTDI chip"};
+    case PortKind::tcp:
+      return {goes_over_serial(unit), "TCP"};
+    case PortKind::serial:
+    case PortKind::sim:
+      break;
+  }
+  return {goes_over_serial(unit), "a serial port"};
 }
 
 // Checks that the port can carry the unit's kind of line. Throws UsageError if not.
 void check_place(const EncoderAddress& uri, std::string_view address) {
-  const bool is_can = uri.port_kind == PortKind::can || uri.port_kind == PortKind::slcan;
-  const bool fits = is_can                           ? uri.unit->link == LinkKind::can
-                    : uri.port_kind == PortKind::spi ? host_clocks(uri.unit->link)
-                                                     : goes_over_serial(*uri.unit);
+  const auto [fits, place] = carries(uri.port_kind, *uri.unit);
   if (fits) return;
-  const std::string_view place = is_can                           ? "a CAN adapter"
-                                 : uri.port_kind == PortKind::spi ? "an SPI controller"
-                                 : uri.port_kind == PortKind::tcp ? "TCP"
-                                                                  : "a serial port";
   throw UsageError(fmt::format("\"{}\": {} ({}) does not go over {}: write {}", address, uri.unit->id,
                                line_of(*uri.unit), place, examples(*uri.unit)));
 }
@@ -238,6 +253,9 @@ void parse_where(EncoderAddress& uri, std::string_view address) {
   } else if (where.starts_with("spi:")) {
     uri.port_kind = PortKind::spi;
     if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
+  } else if (is_ftdi_place(where)) {
+    uri.port_kind = PortKind::ftdi;
+    if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
   } else if (where.starts_with("slcan:")) {
     uri.port_kind = PortKind::slcan;
   } else if (uri.unit->link == LinkKind::can && where.find('/') == std::string_view::npos) {
@@ -245,6 +263,11 @@ void parse_where(EncoderAddress& uri, std::string_view address) {
   }
   check_place(uri, address);
   if (uri.port_kind == PortKind::tcp) return parse_tcp(uri, where.substr(4));
+  if (uri.port_kind == PortKind::ftdi) {
+    const std::string_view behind = where.substr(ftdi_name.size());
+    uri.path = behind.starts_with(':') ? behind.substr(1) : behind;
+    return;
+  }
   uri.path =
       uri.port_kind == PortKind::spi || uri.port_kind == PortKind::slcan ? where.substr(where.find(':') + 1) : where;
   if (uri.path.empty()) {
@@ -344,8 +367,8 @@ const LinkParameter* find_link_parameter(std::string_view name) {
 std::optional<std::string> bare_port(std::string_view text) {
   const std::string_view address = text.substr(0, text.find('?'));
   const std::string_view first = address.substr(0, address.find(':'));
-  const bool is_place =
-      first.find('/') != std::string_view::npos || first == "tcp" || first == "spi" || first == "slcan";
+  const bool is_place = first.find('/') != std::string_view::npos || first == "tcp" || first == "spi" ||
+                        first == "slcan" || is_ftdi_place(address);
   if (is_place) return std::string(text);
   if (!is_name(address)) return std::nullopt;
   const auto is_one_of = [](const std::vector<std::string>& ports, std::string_view name) {
@@ -393,6 +416,16 @@ EncoderAddress parse_address(std::string_view name, const NamedEncoders& names) 
   return uri;
 }
 
+bool is_ftdi_place(std::string_view text) {
+  if (!text.starts_with(ftdi_name)) return false;
+  const std::string_view behind = text.substr(ftdi_name.size());
+  return behind.empty() || behind.starts_with(':') || behind.starts_with('/');
+}
+
+std::string ftdi_place(std::string_view path) {
+  return fmt::format("{}{}{}", ftdi_name, path.empty() || path.starts_with('/') ? "" : ":", path);
+}
+
 host::SpeedLimit speed_limit(const EncoderAddress& uri) {
   host::SpeedLimit limit = host::speed_limit(uri.options);
   if (uri.maximum_rpm != 0) limit.rpm = uri.maximum_rpm;
@@ -403,6 +436,7 @@ host::SpeedLimit speed_limit(const EncoderAddress& uri) {
 std::string address_of(const EncoderAddress& uri) {
   if (uri.port_kind == PortKind::sim) return fmt::format("sim:{}", uri.unit->id);
   if (uri.port_kind == PortKind::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);
+  if (uri.port_kind == PortKind::ftdi) return fmt::format("{}:{}", uri.unit->id, ftdi_place(uri.path));
   if (uri.port_kind == PortKind::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
   if (uri.port_kind == PortKind::slcan) return fmt::format("{}:slcan:{}", uri.unit->id, uri.path);
   return fmt::format("{}:{}", uri.unit->id, uri.path);

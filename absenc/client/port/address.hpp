@@ -14,13 +14,13 @@
 #include "absenc/host/echo.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/serial.hpp"
-#include "absenc/os/spi_port.hpp"
+#include "absenc/os/spi_choice.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
 
-enum class PortKind : std::uint8_t { serial, tcp, spi, can, slcan, sim };
-inline constexpr std::array<std::string_view, 6> port_kind_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
+enum class PortKind : std::uint8_t { serial, tcp, spi, ftdi, can, slcan, sim };
+inline constexpr std::array<std::string_view, 7> port_kind_names{"serial", "tcp", "spi", "ftdi", "can", "slcan", "sim"};
 
 /// Name of the setting for the rate of an asynchronous line.
 inline constexpr std::string_view rate_setting = "baud";
@@ -48,29 +48,30 @@ inline constexpr std::array<LinkParameter, 31> link_parameters{{
     {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan"},
     {"log", "FILE", "write every CAN frame sent and received to it, as candump -l does; it must not exist yet",
      "can, slcan, sim"},
-    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
-    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
+    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi, ftdi"},
+    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi, ftdi"},
     {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
     {"max_rpm", "RPM",
      "the fastest that the shaft turns: farther than it gets no position is believed, nor turns after "
      "too long a pause",
-     "serial, tcp, spi, can, slcan, sim"},
-    {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
+    {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"direction", "1|-1", "-1: the joint turns against the encoder; shown as joint angle beside the encoder's own",
-     "serial, tcp, spi, can, slcan, sim"},
-    {"offset_deg", "DEG", "degrees at the encoder where the joint is at 0", "serial, tcp, spi, can, slcan, sim"},
-    {"offset_mm", "MM", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
-    {"gear", "RATIO", "turns of the encoder for one of the joint: 100, 50/3", "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
+    {"offset_deg", "DEG", "degrees at the encoder where the joint is at 0", "serial, tcp, spi, ftdi, can, slcan, sim"},
+    {"offset_mm", "MM", "the same of a linear encoder", "serial, tcp, spi, ftdi, can, slcan, sim"},
+    {"gear", "RATIO", "turns of the encoder for one of the joint: 100, 50/3",
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"pole_pairs", "N", "of the motor on the encoder's shaft, for its electrical angle",
-     "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"pole_pair_mm", "MM", "length of a pole pair of a linear motor, for its electrical angle",
-     "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"command", "NAME", "what is read, instead of the position with all alarms: a command that yields positions",
-     "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"realtime", "PRIORITY",
      "use the port in real-time threads (SCHED_FIFO) of this priority, 1 to 99, with the memory of the program locked; "
      "an error if the kernel refuses",
-     "serial, tcp, spi, can, slcan, sim"},
+     "serial, tcp, spi, ftdi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
@@ -94,7 +95,9 @@ struct EncoderAddress {
   const Unit* unit = nullptr;
   Options options;
   PortKind port_kind = PortKind::serial;
-  std::string path;  // path of the port for serial, spi, slcan; name of the interface for can
+  // path of the port for serial, spi, slcan; name of the interface for can; "SERIAL/B" for ftdi, "" for the only
+  // adapter
+  std::string path;
   std::string host;  // name or address of the host; only for tcp
   std::uint16_t port = 0;
 
@@ -120,6 +123,12 @@ struct EncoderAddress {
 
 /// Returns the port if `text` is the address of a port without a protocol, as "/dev/ttyUSB0"; otherwise nothing.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
+
+/// First part of a place on an FTDI chip: "ftdi", "ftdi:SERIAL", "ftdi:SERIAL/B", "ftdi/B".
+inline constexpr std::string_view ftdi_name = "ftdi";
+[[nodiscard]] bool is_ftdi_place(std::string_view text);
+/// Returns the place whose EncoderAddress::path is `path`.
+[[nodiscard]] std::string ftdi_place(std::string_view path);
 
 /// Parses an address and further `settings` ("name=value"). Throws UsageError.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});

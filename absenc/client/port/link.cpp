@@ -10,6 +10,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/port/can_log.hpp"
 #include "absenc/client/port/realtime.hpp"
+#include "absenc/os/ftdi_port.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/slcan_port.hpp"
@@ -93,6 +94,18 @@ Link open_spi(const EncoderAddress& uri) {
   Link link;
   const auto port = std::make_shared<os::SpiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
   link.place = fmt::format("{} in SPI mode {}", uri.path, port->settings().spi_mode);
+  link.clock_rate = [controller = port.get()] { return controller->clock_rate(); };
+  link.bytes = port.get();
+  link.owner = port;
+  return link;
+}
+
+Link open_ftdi(const EncoderAddress& uri) {
+  Link link;
+  const auto port = std::make_shared<os::FtdiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
+  link.place = fmt::format("the {} with a clock of {} Hz", port->name(), port->settings().rate);
+  link.clock_rate = [chip = port.get()] { return chip->clock_rate(); };
+  link.is_data_driven = [chip = port.get()] { return chip->look_at_data().driven; };
   link.bytes = port.get();
   link.owner = port;
   return link;
@@ -167,6 +180,8 @@ Link open_link(const EncoderAddress& uri) {
         return open_tcp(uri);
       case PortKind::spi:
         return open_spi(uri);
+      case PortKind::ftdi:
+        return open_ftdi(uri);
       case PortKind::can:
         return open_can(uri);
       case PortKind::slcan:
@@ -198,6 +213,7 @@ Link open_port_for_receiving(const EncoderAddress& uri) {
       throw UsageError(
           "an slcan adapter has to be asked to receive: make an interface of it with slcand, and use candump");
     case PortKind::spi:
+    case PortKind::ftdi:
       throw UsageError("a clocked line is received by a logic analyser: see `absenc decode --help`");
     case PortKind::sim:
       break;

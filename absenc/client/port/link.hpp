@@ -22,6 +22,10 @@ struct Link {
   int realtime = 0;   // real-time priority, 1 to 99, of threads that use the port; 0: none
   Time character{};   // duration of a character on the line; 0: unknown, or bytes take no time
   std::string place;  // port in words, "/dev/ttyUSB0 at 2500000 baud"
+  // looks whether something drives the data pin while the encoder is not clocked; null if the port cannot look
+  std::function<bool()> is_data_driven{};
+  // returns the clock rate in Hz of the last transfer; null if the port makes no clock
+  std::function<std::uint32_t()> clock_rate{};
   // sentences for the user about the port, for example about a driver setting that slows it down
   std::vector<std::string> notes;
 };

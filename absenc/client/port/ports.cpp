@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "absenc/client/port/address.hpp"
+#include "absenc/os/ftdi_usb.hpp"
 #include "absenc/os/port_facts.hpp"
 #include "absenc/os/socketcan.hpp"
 #include "absenc/os/spi_port.hpp"
@@ -19,12 +21,19 @@ std::vector<FoundPort> ports() {
   for (const std::string& path : os::serial_ports()) all.push_back({path, "serial", os::inspect_port(path)});
   for (const std::string& interface : os::can_interfaces()) all.push_back({interface, "can"});
   for (const std::string& device : os::spi_devices()) all.push_back({device, "spi"});
+  for (const os::FtdiAdapter& adapter : os::system_ftdi().adapters()) {
+    for (unsigned channel = 0; channel < adapter.channels; ++channel) {
+      const std::string letter = adapter.channels > 1 ? fmt::format("/{}", static_cast<char>('A' + channel)) : "";
+      const std::string path = ftdi_place(adapter.usb.serial_number + letter);
+      all.push_back({path, "ftdi", {.path = path, .usb = adapter.usb, .refusal = adapter.refusal}});
+    }
+  }
   return all;
 }
 
 Json to_json(const FoundPort& port) {
   Json json = Json::object().set("port", port.path).set("kind", port.kind);
-  if (port.kind != "serial") return json;
+  if (port.kind != "serial" && port.kind != "ftdi") return json;
   const auto known = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
   const os::ListedPort& serial = port.serial;
   const os::UsbAdapter usb = serial.usb.value_or(os::UsbAdapter{});

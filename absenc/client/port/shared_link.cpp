@@ -31,6 +31,7 @@ std::string place_key(const EncoderAddress& one) {
       return fmt::format("{}:{}", place, device(one.path).string());
     case PortKind::can:
     case PortKind::spi:
+    case PortKind::ftdi:
       return fmt::format("{}:{}", place, one.path);
     case PortKind::tcp:
       return fmt::format("{}:{}:{}", place, one.host, one.port);
@@ -41,8 +42,9 @@ std::string place_key(const EncoderAddress& one) {
 }
 
 bool same_place(const EncoderAddress& one, const EncoderAddress& other) {
-  return one.port_kind == other.port_kind && one.port_kind != PortKind::spi && one.port_kind != PortKind::sim &&
-         place_key(one) == place_key(other);
+  const bool shared =
+      one.port_kind != PortKind::spi && one.port_kind != PortKind::ftdi && one.port_kind != PortKind::sim;
+  return one.port_kind == other.port_kind && shared && place_key(one) == place_key(other);
 }
 
 std::string latency_text(const std::optional<Time>& latency) {
@@ -110,6 +112,9 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
       const EncoderAddress& before = encoders[other];
       if (one.port_kind == PortKind::spi && before.port_kind == PortKind::spi && one.path == before.path) {
         throw UsageError(fmt::format("{} and {} are the same SPI device", names[other], names[i]));
+      }
+      if (one.port_kind == PortKind::ftdi && before.port_kind == PortKind::ftdi) {
+        throw UsageError(fmt::format("{} and {} are on the same channel of an FTDI chip", names[other], names[i]));
       }
       if (!share_line(one, before)) continue;
       const bool same = one.unit == before.unit && one.options.values == before.options.values;

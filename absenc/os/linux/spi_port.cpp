@@ -10,18 +10,13 @@
 #include <array>
 #include <cerrno>
 #include <cstddef>
-#include <stdexcept>
 #include <system_error>
-#include <utility>
 
-#include "absenc/core/bit_view.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
-
-using namespace std::chrono_literals;
 
 using Kind = Failure::Kind;
 
@@ -83,9 +78,11 @@ std::vector<std::string> spi_devices(const std::filesystem::path& sys) {
 
 SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice,
                  SpiKernel& kernel)
-    : path_(path), kind_(kind), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
-  if (!host_clocks(kind)) {
-    throw std::invalid_argument("an SPI controller exchanges bytes or clocks bits");
+    : TransferPort(kind), path_(path), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
+  if (kind == LinkKind::clocked_bidirectional) {
+    throw Failure(Kind::unsupported,
+                  "an SPI controller of Linux cannot turn the direction of its data line within a transfer: use an "
+                  "FT232H (docs/clock-cable.md), or a microcontroller");
   }
   if (!descriptor_) throw spi_failure(path, errno);
   std::uint32_t mode = 0;
@@ -96,59 +93,26 @@ SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& set
   apply(settings);
 }
 
-Time SpiPort::now() { return waiting_.now(); }
-
-void SpiPort::begin(const ByteStep& step) {
-  switch (step.kind) {
-    case ByteStep::Kind::transfer:
-      // SIGINT and SIGTERM are checked here, because a caller that reads without pauses never waits.
-      if (interrupted() && take_interrupt()) throw Interrupted{};
-      if (step.hold_low) {
-        hold_low(step.at);
-      } else {
-        reach(step.at);
-      }
-      transfer(step);
-      break;
-    case ByteStep::Kind::pulse:
-      throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear wires: use a serial port");
-    case ByteStep::Kind::configure:
-      change_rate(step.rate);
-      break;
-    case ByteStep::Kind::wait:
-    case ByteStep::Kind::emit:
-    case ByteStep::Kind::done:
-      break;
+void SpiPort::exchange(const ByteStep& step, TransferResult& received) {
+  if (step.hold_low) {
+    hold_low(step.at);
+  } else {
+    reach(step.at);
   }
-}
-
-ByteEvent SpiPort::wait(const ByteStep& step) {
-  waiting_.begin(step);
-  if (std::exchange(sent_pending_, false)) {
-    return waiting_.report({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
-  }
-  if (std::exchange(received_pending_, false)) {
-    return waiting_.report({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
-  }
-  sleep_until(waiting_.due());
-  return waiting_.take_due(std::max(os::now(), waiting_.due())).value();
-}
-
-void SpiPort::transfer(const ByteStep& step) {
-  const bool clocked = carries_bits(kind_);
+  const bool clocked = carries_bits(kind());
   const std::size_t clocks = settings_.idle_clocks + step.bits;
   in_.assign(clocked ? (clocks + 7) / 8 : std::max(step.out.size(), step.expect), 0);
   out_.assign(step.out.begin(), step.out.end());
   out_.resize(in_.size(), 0);
   const Time before = os::now();
   if (!in_.empty()) send_message(!clocked);
-  sent_at_ = os::now();
-  sent_late_ = sent_at_ - before;
-  if (clocked) extract_bits(step.bits);
-  sent_pending_ = true;
-  received_pending_ = !in_.empty();
-  waiting_.silence.sent(sent_at_);
-  if (received_pending_) waiting_.silence.received(sent_at_);
+  received.at = os::now();
+  received.late = received.at - before;
+  if (clocked) {
+    extract(in_, settings_.idle_clocks, step.bits, received);
+  } else {
+    received.items = in_;
+  }
 }
 
 // Sends `out_` and receives `in_` in one SPI message: the chip stays selected from the first transfer to the last.
@@ -177,19 +141,6 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// Moves the requested bits to the beginning of the received bytes: drops the bits of the idle clocks before, and
-// those after `bits`.
-void SpiPort::extract_bits(std::size_t bits) {
-  const BitView clocked{in_, in_.size() * 8};
-  idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
-  std::vector<std::uint8_t> extracted((bits + 7) / 8);
-  for (std::size_t i = 0; i < extracted.size(); ++i) {
-    const auto count = static_cast<unsigned>(std::min<std::size_t>(8, bits - 8 * i));
-    extracted[i] = static_cast<std::uint8_t>(clocked.load(settings_.idle_clocks + 8 * i, count) << (8 - count));
-  }
-  in_ = std::move(extracted);
-}
-
 // Applies only changed settings: a conversation may configure the line before each reading.
 void SpiPort::apply(LineSettings settings) {
   settings.rate = choice_.speed.value_or(settings.rate);
@@ -214,7 +165,7 @@ void SpiPort::set_mode(std::uint8_t mode) {
   const int error = set ? EINVAL : errno;
   if (set && control(SPI_IOC_RD_MODE32, &given) >= 0 && (given & ours) == mode) return;
   std::string advice = "use another controller";
-  if (carries_bits(kind_)) {
+  if (carries_bits(kind())) {
     advice =
         "swap the two wires of the clock pair and set spi_mode=" + std::to_string(mode ^ SPI_CPOL) + ", or " + advice;
   }

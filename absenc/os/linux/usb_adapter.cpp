@@ -2,6 +2,7 @@
 #include "absenc/os/usb_adapter.hpp"
 
 #include "absenc/os/linux/sys_file.hpp"
+#include "absenc/os/linux/usb_device.hpp"
 
 namespace absenc::os {
 
@@ -14,6 +15,11 @@ std::uint16_t number_of(const fs::path& path) { return static_cast<std::uint16_t
 
 }  // namespace
 
+UsbAdapter usb_device(const fs::path& folder) {
+  return {number_of(folder / "idVendor"),      number_of(folder / "idProduct"), number_of(folder / "bcdDevice"),
+          first_line(folder / "manufacturer"), first_line(folder / "product"),  first_line(folder / "serial")};
+}
+
 std::optional<UsbAdapter> usb_adapter(const std::string& terminal, const fs::path& sys) {
   std::error_code error;
   fs::path folder = fs::canonical(sys / terminal / "device", error);
@@ -21,9 +27,7 @@ std::optional<UsbAdapter> usb_adapter(const std::string& terminal, const fs::pat
   // Only the USB device, above the terminal's interface, has an idVendor.
   for (; folder.has_relative_path(); folder = folder.parent_path()) {
     if (!fs::exists(folder / "idVendor", error)) continue;
-    return UsbAdapter{number_of(folder / "idVendor"),  number_of(folder / "idProduct"),
-                      number_of(folder / "bcdDevice"), first_line(folder / "manufacturer"),
-                      first_line(folder / "product"),  first_line(folder / "serial")};
+    return usb_device(folder);
   }
   return std::nullopt;
 }

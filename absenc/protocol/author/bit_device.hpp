@@ -34,7 +34,7 @@ class BitDevice : public EncoderOn<std::uint8_t> {
   /// Bits of a request or of a supplement: enough for 16 bits of data behind command and address.
   using ReceivedBits = BitBuffer<96>;
   /// Bits that the encoder drives: zeros while it is not ready, the reply, and what follows it.
-  using DrivenBits = BitBuffer<2048>;
+  using AnswerBits = BitBuffer<2048>;
 
   /// Constructs an encoder that is off. `start_time`: duration of its start-up. `rules` must outlive it.
   BitDevice(Time start_time, const DirectionRules& rules) : EncoderOn(start_time), directions_(&rules) {}
@@ -45,7 +45,7 @@ class BitDevice : public EncoderOn<std::uint8_t> {
   /// Returns the number of bits of the request that begins with `begin`, at least those of its command.
   [[nodiscard]] virtual std::size_t request_size(BitView begin) const = 0;
   /// Puts the bits to drive behind the request into `bits`. `at`: the end of its last bit.
-  virtual void respond(BitView request, Time at, DrivenBits& bits) = 0;
+  virtual void respond(BitView request, Time at, AnswerBits& bits) = 0;
   /// Handles the bits that the host sends behind the reply.
   virtual void supplemented(BitView /*bits*/, Time /*at*/) {}
   /// Is called when the host has stopped the clock after `clocks` clocks.
@@ -61,7 +61,7 @@ class BitDevice : public EncoderOn<std::uint8_t> {
   void received(const Event<std::uint8_t>& event);
 
   const DirectionRules* directions_;
-  DrivenBits bits_;
+  AnswerBits bits_;
   std::size_t driven_from_ = 0;  // number of clocks of the exchange before the first driven bit
   std::size_t taken_ = 0;
   bool pending_ = false;   // the step that drives `bits_` has not been returned yet

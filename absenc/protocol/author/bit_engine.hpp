@@ -32,15 +32,17 @@ struct BitRequest {
 
 /// Conversation on a clocked line whose data turns; a subclass provides the protocol.
 ///
-///   | state    | next step                                                              | continues with |
-///   |----------|------------------------------------------------------------------------|-----------------------------|
-///   | ready    | the request, and the first clocks of the reply                         | clocking | | clocking |
-///   none: the received bits are awaited                                    | missing, adding, over       | | missing
-///   | as many clocks as the reply still needs, while the clock rests low     | clocking                    | | adding
-///   | the supplement, or one clock that ends an exchange with a bad reply    | added                       | | added
-///   | none: the end of the supplement is awaited                             | over                        | |
-///   sleeping | none: a time is awaited                                                | ready, over                 |
-///   | ending   | none: the encoder may still execute a request that failed              | over |
+///   | state    | next step                                       | continues with        |
+///   |----------|-------------------------------------------------|-----------------------|
+///   | ready    | the request, and the first clocks of the reply  | clocking              |
+///   | clocking | none: the received bits are awaited             | missing, adding, over |
+///   | missing  | the clocks that the reply still needs           | clocking              |
+///   | adding   | the supplement; one clock behind a bad reply    | added                 |
+///   | added    | none: the end of the exchange is awaited        | over                  |
+///   | sleeping | none: a time is awaited                         | ready, over           |
+///   | ending   | none: the encoder may still execute the request | over                  |
+///
+/// Between two transfers of one exchange the clock rests low.
 class BitEngine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.

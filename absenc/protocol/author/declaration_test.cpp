@@ -113,6 +113,7 @@ FrameEnd end_of_frame(const Options&, Direction, Bytes) { return {FrameEnd::Kind
 bool is_answered(const Options&, Frame) { return true; }
 bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
 BitRanges bits_in(const Options&, Frame, Frame, const FieldInfo&) { return {}; }
+BitRanges host_bits(const Options&, Frame) { return {}; }
 bool probe(Options&, std::span<const Capture>, EvidenceSink&) { return true; }
 bool streams(const Options&) { return true; }
 ExtraWires wires(const Options&) { return {}; }
@@ -155,6 +156,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .streams = streams,
     .extra_wires = wires,
     .control_bit = control_bit,
+    .host_bits = host_bits,
     .reportable = [](const Options&) -> std::uint32_t { return 13; },
     .remembered = remembered,
     .follower = follower,
@@ -188,6 +190,7 @@ constexpr std::array<std::uint8_t, 1> reply{6};
 
 TEST(Declaration, LeavesOutUndeclaredMembers) {
   EXPECT_EQ(unit.is_checked, nullptr);
+  EXPECT_EQ(unit.host_bits, nullptr);
   EXPECT_EQ(unit.bits, nullptr);
   EXPECT_EQ(unit.probe, nullptr);
   EXPECT_EQ(unit.streams, nullptr);
@@ -233,6 +236,7 @@ TEST(Declaration, SetsEachMemberOfTheUnit) {
   EXPECT_EQ(whole_unit.is_answered, is_answered);
   EXPECT_EQ(whole_unit.is_checked, is_checked);
   EXPECT_EQ(whole_unit.bits, bits_in);
+  EXPECT_EQ(whole_unit.host_bits, host_bits);
   EXPECT_EQ(whole_unit.probe, probe);
   EXPECT_EQ(whole_unit.streams, streams);
   EXPECT_EQ(whole_unit.extra_wires, wires);

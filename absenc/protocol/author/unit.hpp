@@ -180,8 +180,10 @@ struct Descriptor {
     if (one.request == nullptr) return Error::unsupported;
     const Result<Request> request = one.request(f, arguments);
     if (!request) return request.error();
-    if constexpr (Bitwise<P>) return bits_as_text(P::encode(f, *request), out);
-    else return bytes_of(f, *request, out);
+    if constexpr (Bitwise<P>)
+      return bits_as_text(P::encode(f, *request), out);
+    else
+      return bytes_of(f, *request, out);
   }
   /// Writes the bytes of a request into `out` and returns their number.
   static Result<std::size_t> bytes_of(const Format& f, const Request& request, MutableBytes out) {

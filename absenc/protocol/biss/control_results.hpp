@@ -35,7 +35,7 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; a character that cannot be printed is shown as \x and two hexadecimal
+/// The two characters of a manufacturer as text; a character that cannot be printed is shown as `\x` and two hexadecimal
 /// digits.
 class MakerName {
  public:

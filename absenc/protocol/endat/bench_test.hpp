@@ -17,8 +17,8 @@ struct SetShaft final : Shaft {
 
 /// A virtual encoder on a line, on which conversations run one after the other.
 struct Bench {
-  explicit Bench(const Format& format, const Behaviour& behaviour = {})
-      : encoder(format, shaft, behaviour), line(LinkKind::clocked_bidirectional, format.line()) {
+  explicit Bench(const Format& format, const EncoderTimes& times = {})
+      : encoder(format, shaft, times), line(LinkKind::clocked_bidirectional, format.line()) {
     line.attach(sim::NodeRole::device, encoder);
     encoder.power_on(line.now(), Device<std::uint8_t>::PowerOn::skip);
     node = line.attach(sim::NodeRole::host, idle);

@@ -18,17 +18,17 @@ constexpr std::uint16_t supported_warnings = alarm::warnings >> alarm::warnings_
 }  // namespace
 
 // A short latency of the format makes the encoder as fast; a long one is only the host's limit.
-Behaviour VirtualEncoder::behaviour_for(const Format& format) {
-  Behaviour behaviour;
-  behaviour.latency = std::min(format.latency, behaviour.latency);
-  return behaviour;
+EncoderTimes VirtualEncoder::times_for(const Format& format) {
+  EncoderTimes times;
+  times.latency = std::min(format.latency, times.latency);
+  return times;
 }
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour)
+VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft, const EncoderTimes& times)
     : BitDevice(500ms, directions),
       format_(with_resolution(format)),
       shaft_(&shaft),
-      behaviour_(behaviour),
+      times_(times),
       info1_(format.info1),
       info2_(format.info2) {
   write_parameters();
@@ -96,7 +96,7 @@ void VirtualEncoder::write_parameters() {
   }
   store(errors_supported_word, supported_errors);
   store(warnings_supported_word, supported_warnings);
-  store(command_set_word, format_.version == Version::v22 ? 1 : 0);
+  store(command_set_word, format_.version == CommandSet::v22 ? 1 : 0);
   store(initialisation_word, format_.recovery == Recovery::short_time ? short_recovery_bits : long_recovery_bits);
 }
 
@@ -139,7 +139,7 @@ void VirtualEncoder::selected(Time at, Time period) {
   period_ = period == Time{} ? format_.period() : period;
   latched_at_ = at;
   needed_clocks_ = 0;
-  const std::uint32_t fastest = format_.version == Version::v21 ? fastest_21 : fastest_22;
+  const std::uint32_t fastest = format_.version == CommandSet::v21 ? fastest_21 : fastest_22;
   expect(period_ >= Time(1'000'000'000 / fastest), rules::fastest, at);
   expect(period_ <= Time(1'000'000'000 / slowest), rules::slowest, at);
   is_valid_ = expect(at >= free_at_, rules::recovery, at);
@@ -148,17 +148,18 @@ void VirtualEncoder::selected(Time at, Time period) {
 std::size_t VirtualEncoder::request_size(BitView begin) const {
   if (begin.size < command_bits) return command_bits;
   const auto code = static_cast<std::uint8_t>(begin.load(lead_bits, 6));
-  return is_code(code) ? endat::request_size(static_cast<Code>(code)) : command_bits;
+  return is_code(code) ? endat::request_size(static_cast<ModeCommand>(code)) : command_bits;
 }
 
-void VirtualEncoder::respond(BitView request, Time at, DrivenBits& bits) {
+void VirtualEncoder::respond(BitView request, Time at, AnswerBits& bits) {
   now_ = at;
   request_ = {};
   const auto code = static_cast<std::uint8_t>(request.load(lead_bits, 6));
-  is_valid_ = is_valid_ && is_code(code) && (format_.version == Version::v22 || !is_22(static_cast<Code>(code)));
+  is_valid_ =
+      is_valid_ && is_code(code) && (format_.version == CommandSet::v22 || !is_22(static_cast<ModeCommand>(code)));
   // An encoder that does not understand its request drives nothing.
   if (!is_valid_) return;
-  request_.code = static_cast<Code>(code);
+  request_.code = static_cast<ModeCommand>(code);
   if (has_parameters(request_.code)) {
     request_ = *decode_request(request);
     respond_parameters(request_, at, bits);
@@ -167,10 +168,10 @@ void VirtualEncoder::respond(BitView request, Time at, DrivenBits& bits) {
   }
 }
 
-void VirtualEncoder::drive(std::size_t zeros, Code code, const Reply& reply, DrivenBits& bits) {
+void VirtualEncoder::drive(std::size_t zeros, ModeCommand code, const Reply& reply, AnswerBits& bits) {
   const auto rate = static_cast<std::uint32_t>(1'000'000'000 / period_.count());
   std::size_t low = zeros + delay_clocks(format_.line_delay_ns, rate);
-  low = std::min(low, DrivenBits::capacity() - 192);
+  low = std::min(low, AnswerBits::capacity() - 192);
   for (; low > 0; low -= std::min<std::size_t>(low, 64)) {
     static_cast<void>(bits.append(0, static_cast<unsigned>(std::min<std::size_t>(low, 64))));
   }
@@ -181,13 +182,13 @@ void VirtualEncoder::drive(std::size_t zeros, Code code, const Reply& reply, Dri
   count_answer();
 }
 
-void VirtualEncoder::respond_position(Code code, DrivenBits& bits) {
-  const auto calculated = static_cast<std::size_t>((behaviour_.latency + period_ - 1ns) / period_);
+void VirtualEncoder::respond_position(ModeCommand code, AnswerBits& bits) {
+  const auto calculated = static_cast<std::size_t>((times_.latency + period_ - 1ns) / period_);
   const std::size_t zeros = std::max(command_bits + turn_bits, calculated) - command_bits;
   const bool error = (latched_ & (alarm::errors | alarm::error)) != 0;
   position_ = position(latched_at_);
   Reply reply{.position = position_, .f1 = error, .f2 = !error};
-  if (code == Code::test_values) reply.position = 0;
+  if (code == ModeCommand::test_values) reply.position = 0;
   if (is_22(code)) {
     for (const std::uint8_t mrs : {info2_, info1_}) {
       if (mrs != 0) reply.infos[reply.info_count++] = info(mrs);
@@ -196,25 +197,25 @@ void VirtualEncoder::respond_position(Code code, DrivenBits& bits) {
   drive(zeros, code, reply, bits);
 }
 
-void VirtualEncoder::respond_parameters(const Request& request, Time at, DrivenBits& bits) {
+void VirtualEncoder::respond_parameters(const Request& request, Time at, AnswerBits& bits) {
   expect(period_ >= Time(1'000'000'000 / fastest_21), rules::parameter_clock, at);
-  Time takes = behaviour_.read_time;
+  Time takes = times_.read_time;
   // A refused access repeats another MRS code or address: the inverted one.
   Reply reply{.byte = request.byte, .word = request.word};
   const auto refuse = [&] { reply.byte = static_cast<std::uint8_t>(~request.byte); };
   const WordPlace word{area_, request.byte};
   switch (request.code) {
-    case Code::select:
+    case ModeCommand::select:
       author::has_page(memory_areas, request.byte) ? select(request.byte) : refuse();
       break;
-    case Code::read:
+    case ModeCommand::read:
       find_word(word.mrs, word.address) != nullptr ? void(reply.word = load(word)) : refuse();
       break;
-    case Code::write:
-      takes = behaviour_.write_time;
+    case ModeCommand::write:
+      takes = times_.write_time;
       if (!write(word, request.word)) refuse();
       break;
-    case Code::test:
+    case ModeCommand::test:
       port_ = request.byte;
       break;
     default:
@@ -222,11 +223,11 @@ void VirtualEncoder::respond_parameters(const Request& request, Time at, DrivenB
   }
   const auto zeros = static_cast<std::size_t>((takes + period_ - 1ns) / period_) + turn_bits;
   drive(zeros, request.code, reply, bits);
-  if (request.code == Code::reset) {
+  if (request.code == ModeCommand::reset) {
     info1_ = info2_ = 0;
     latched_ = 0;
     is_valid_ = false;
-    restart(at + behaviour_.reset_time);
+    restart(at + times_.reset_time);
   }
 }
 
@@ -238,27 +239,27 @@ void VirtualEncoder::supplemented(BitView bits, Time at) {
 }
 
 void VirtualEncoder::execute(const Request& request, Time at) {
-  const bool is_access = request.code == Code::read_22 || request.code == Code::write_22;
+  const bool is_access = request.code == ModeCommand::read_22 || request.code == ModeCommand::write_22;
   if (is_access && !expect(at >= access_.ready_at, rules::busy, at)) return;
   const WordPlace word{area_, request.byte};
   switch (request.code) {
-    case Code::select_22:
+    case ModeCommand::select_22:
       select(request.byte);
       break;
-    case Code::read_22:
+    case ModeCommand::read_22:
       if (find_word(word.mrs, word.address) != nullptr) {
-        access_ = {request.byte, load(word), at + behaviour_.read_time};
+        access_ = {request.byte, load(word), at + times_.read_time};
       }
       break;
-    case Code::write_22:
-      if (write(word, request.word)) access_ = {request.byte, request.word, at + behaviour_.write_time};
+    case ModeCommand::write_22:
+      if (write(word, request.word)) access_ = {request.byte, request.word, at + times_.write_time};
       break;
-    case Code::error_reset_22:
+    case ModeCommand::error_reset_22:
       latched_ &= ~(alarm::errors | alarm::error);
       info1_ = info2_ = 0;
       area_ = 0;
       break;
-    case Code::test_22:
+    case ModeCommand::test_22:
       port_ = request.byte;
       break;
     default:
@@ -278,7 +279,7 @@ void VirtualEncoder::clocked(Time at, std::size_t clocks) {
   if (is_valid_) expect(clocks >= needed_clocks_, rules::few_clocks, at);
   const bool is_short = is_22(request_.code) && (load(initialisation_word) & recovery_mask) == short_recovery_bits;
   // The recovery time begins at the last rising edge.
-  free_at_ = at - period_ / 2 + (is_short ? behaviour_.short_recovery : behaviour_.long_recovery);
+  free_at_ = at - period_ / 2 + (is_short ? times_.short_recovery : times_.long_recovery);
 }
 
 // ---- Additional information

@@ -16,20 +16,28 @@ inline constexpr auto conditions = std::array{
     Condition{"temperature", "degC", "inside the encoder", -40, 125, 30},
 };
 
-/// Rules for hosts that the virtual encoder checks. The words are those of the clauses.
+/// Rules for hosts that the virtual encoder checks.
 namespace rules {
+/// Pause that the encoder needs after an exchange.
 inline constexpr std::string_view recovery = "clocked before the recovery time has passed";
+/// Highest rate of the clock.
 inline constexpr std::string_view fastest = "clock faster than the encoder's version allows";
+/// Lowest rate of the clock.
 inline constexpr std::string_view slowest = "clock slower than 100 kHz";
+/// Highest rate of the clock for parameters.
 inline constexpr std::string_view parameter_clock = "parameters clocked faster than 2 MHz";
+/// Clocks that a reply needs.
 inline constexpr std::string_view few_clocks = "fewer clocks than the reply has bits";
+/// Parameters only after the reply.
 inline constexpr std::string_view collision = "the host drives parameters while the encoder drives its reply";
+/// Supplement only after the reply.
 inline constexpr std::string_view early_supplement = "the host drives a supplement while the encoder drives its reply";
+/// Memory only while it is not busy.
 inline constexpr std::string_view busy = "the memory accessed while BUSY is set";
 }  // namespace rules
 
 /// Times of the virtual encoder: within the limits of the sources, which state no others.
-struct Behaviour {
+struct EncoderTimes {
   Time latency = 4us;         ///< Time from the first falling edge until the position is calculated.
   Time read_time = 200us;     ///< Duration of a read access to the memory.
   Time write_time = 900us;    ///< Duration of a write access to the memory.
@@ -42,9 +50,9 @@ struct Behaviour {
 class VirtualEncoder final : public author::BitDevice {
  public:
   /// Constructs an encoder with the properties of `format`; it is off until `power_on`. `shaft` must outlive it.
-  VirtualEncoder(const Format& format, const Shaft& shaft) : VirtualEncoder(format, shaft, behaviour_for(format)) {}
-  /// Constructs an encoder with the times of `behaviour`; it is off until `power_on`. `shaft` must outlive it.
-  VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour);
+  VirtualEncoder(const Format& format, const Shaft& shaft) : VirtualEncoder(format, shaft, times_for(format)) {}
+  /// Constructs an encoder with the times of `times`; it is off until `power_on`. `shaft` must outlive it.
+  VirtualEncoder(const Format& format, const Shaft& shaft, const EncoderTimes& times);
 
   [[nodiscard]] MutableBytes memory() override { return memory_; }
   /// Raises the alarms `bits`. They end when a host clears them, or with a reset.
@@ -61,18 +69,18 @@ class VirtualEncoder final : public author::BitDevice {
     Time ready_at{};
   };
 
-  static Behaviour behaviour_for(const Format& format);
+  static EncoderTimes times_for(const Format& format);
 
   void selected(Time at, Time period) override;
   [[nodiscard]] std::size_t request_size(BitView begin) const override;
-  void respond(BitView request, Time at, DrivenBits& bits) override;
+  void respond(BitView request, Time at, AnswerBits& bits) override;
   void supplemented(BitView bits, Time at) override;
   void clocked(Time at, std::size_t clocks) override;
   void started(Time at) override;
 
-  void respond_position(Code code, DrivenBits& bits);
-  void respond_parameters(const Request& request, Time at, DrivenBits& bits);
-  void drive(std::size_t zeros, Code code, const Reply& reply, DrivenBits& bits);
+  void respond_position(ModeCommand code, AnswerBits& bits);
+  void respond_parameters(const Request& request, Time at, AnswerBits& bits);
+  void drive(std::size_t zeros, ModeCommand code, const Reply& reply, AnswerBits& bits);
   void execute(const Request& request, Time at);
   void select(std::uint8_t mrs);
   [[nodiscard]] Info info(std::uint8_t mrs) const;
@@ -90,7 +98,7 @@ class VirtualEncoder final : public author::BitDevice {
 
   Format format_;
   const Shaft* shaft_;
-  Behaviour behaviour_;
+  EncoderTimes times_;
   std::array<std::uint8_t, 2 * word_count> memory_{};
   std::int64_t temperature_ = conditions[0].normal;
   std::uint32_t latched_ = 0;  // alarms that were raised and not cleared since

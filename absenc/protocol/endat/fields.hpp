@@ -127,22 +127,22 @@ inline constexpr auto fields = [] {
 [[nodiscard]] constexpr Values values_of(const Request& request) {
   Values all{.command = static_cast<std::uint8_t>(request.code)};
   switch (request.code) {
-    case Code::select:
-    case Code::select_22:
+    case ModeCommand::select:
+    case ModeCommand::select_22:
       all.area = request.byte;
       break;
-    case Code::read:
-    case Code::read_22:
+    case ModeCommand::read:
+    case ModeCommand::read_22:
       all.address = request.byte;
       break;
-    case Code::write:
-    case Code::write_22:
+    case ModeCommand::write:
+    case ModeCommand::write_22:
       all.address = request.byte;
       all.value = request.word;
       break;
-    case Code::test:
-    case Code::test_22:
-    case Code::communicate:
+    case ModeCommand::test:
+    case ModeCommand::test_22:
+    case ModeCommand::communicate:
       all.port = request.byte;
       all.instruction = request.word;
       break;
@@ -170,16 +170,16 @@ constexpr void add_position(Values& all, const Format& given, const Reply& reply
 [[nodiscard]] constexpr Values values_of(const Format& format, const Request& request, const Reply& reply) {
   Values all = values_of(request);
   all.start = reply.start;
-  if (request.code == Code::test_values) {
+  if (request.code == ModeCommand::test_values) {
     all.f1 = reply.f1;
     all.test_values = reply.position;
   } else if (has_position(request.code)) {
     add_position(all, format, reply);
     all.f1 = reply.f1;
     if (is_22(request.code)) all.f2 = reply.f2;
-  } else if (request.code == Code::read) {
+  } else if (request.code == ModeCommand::read) {
     all.value = reply.word;
-  } else if (request.code == Code::test || request.code == Code::communicate) {
+  } else if (request.code == ModeCommand::test || request.code == ModeCommand::communicate) {
     all.instruction = reply.word;
   }
   if (reply.alarms_read) all.alarms = *reply.alarms_read;

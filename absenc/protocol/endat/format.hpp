@@ -16,7 +16,7 @@ namespace absenc::endat {
 using namespace std::chrono_literals;
 
 /// Version of the protocol whose commands read the position and the memory.
-enum class Version : std::uint8_t { v21, v22 };
+enum class CommandSet : std::uint8_t { v21, v22 };
 /// Recovery time that the encoder keeps after commands of EnDat 2.2 (word 3 of the operating status).
 enum class Recovery : std::uint8_t {
   long_time,   ///< 10 to 30 us, as after commands of EnDat 2.1
@@ -31,10 +31,10 @@ struct Format {
   std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
   std::uint8_t position_bits = 0;    ///< Bits of a linear encoder's position; 0: rotary.
   std::int64_t unit_pm = 0;          ///< Picometres per count of a linear encoder; 0: not given.
-  Version version = Version::v22;    ///< Version whose commands are used.
-  std::uint16_t clock_khz = 1000;    ///< Rate of the clock, 100 to 16 000 kHz.
-  Time latency = 10us;               ///< Longest time from the first falling edge until the position is calculated.
-  std::uint32_t line_delay_ns = 0;   ///< Delay of line and transceivers, there and back, in ns.
+  CommandSet version = CommandSet::v22;  ///< Version whose commands are used.
+  std::uint16_t clock_khz = 1000;        ///< Rate of the clock, 100 to 16 000 kHz.
+  Time latency = 10us;                   ///< Longest time from the first falling edge until the position is calculated.
+  std::uint32_t line_delay_ns = 0;       ///< Delay of line and transceivers, there and back, in ns.
   Recovery recovery = Recovery::long_time;  ///< Recovery time after commands of EnDat 2.2.
   /// MRS code of the additional information 1 that is selected when the host begins, 0x40 to 0x4E; 0: none.
   std::uint8_t info1 = 0;
@@ -103,6 +103,7 @@ inline constexpr std::uint8_t status = 0xB9;     ///< Operating status: errors, 
 inline constexpr std::uint8_t maker_22 = 0xBD;   ///< Parameters of the encoder's maker for EnDat 2.2.
 }  // namespace area
 
+/// Returns the description of `count` words of an area, the first of which has the number `first`.
 constexpr MemoryArea words(std::uint32_t mrs, std::uint32_t first, std::uint32_t count, std::string_view meaning,
                            bool writable) {
   return {.page = mrs, .first = first, .count = count, .meaning = meaning, .writable = writable, .word = 2};

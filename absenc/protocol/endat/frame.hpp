@@ -17,7 +17,7 @@
 namespace absenc::endat {
 
 /// Mode commands, the six bits of a request.
-enum class Code : std::uint8_t {
+enum class ModeCommand : std::uint8_t {
   position = 0b000'111,
   select = 0b001'110,
   write = 0b011'100,
@@ -36,45 +36,52 @@ enum class Code : std::uint8_t {
 
 /// Returns whether `code` is a mode command of section "Mode commands".
 [[nodiscard]] constexpr bool is_code(std::uint8_t code) {
-  switch (static_cast<Code>(code)) {
-    case Code::position:
-    case Code::select:
-    case Code::write:
-    case Code::read:
-    case Code::reset:
-    case Code::test_values:
-    case Code::test:
-    case Code::communicate:
-    case Code::position_22:
-    case Code::select_22:
-    case Code::write_22:
-    case Code::read_22:
-    case Code::error_reset_22:
-    case Code::test_22:
+  switch (static_cast<ModeCommand>(code)) {
+    case ModeCommand::position:
+    case ModeCommand::select:
+    case ModeCommand::write:
+    case ModeCommand::read:
+    case ModeCommand::reset:
+    case ModeCommand::test_values:
+    case ModeCommand::test:
+    case ModeCommand::communicate:
+    case ModeCommand::position_22:
+    case ModeCommand::select_22:
+    case ModeCommand::write_22:
+    case ModeCommand::read_22:
+    case ModeCommand::error_reset_22:
+    case ModeCommand::test_22:
       return true;
   }
   return false;
 }
 /// Returns whether the host sends 24 bits of parameters directly behind the mode command.
-[[nodiscard]] constexpr bool has_parameters(Code code) {
-  return code == Code::select || code == Code::write || code == Code::read || code == Code::reset ||
-         code == Code::test || code == Code::communicate;
+[[nodiscard]] constexpr bool has_parameters(ModeCommand code) {
+  return code == ModeCommand::select || code == ModeCommand::write || code == ModeCommand::read ||
+         code == ModeCommand::reset || code == ModeCommand::test || code == ModeCommand::communicate;
 }
 /// Returns whether the host sends a supplement of 24 bits behind the position.
-[[nodiscard]] constexpr bool has_supplement(Code code) {
-  return code == Code::select_22 || code == Code::write_22 || code == Code::read_22 || code == Code::error_reset_22 ||
-         code == Code::test_22;
+[[nodiscard]] constexpr bool has_supplement(ModeCommand code) {
+  return code == ModeCommand::select_22 || code == ModeCommand::write_22 || code == ModeCommand::read_22 ||
+         code == ModeCommand::error_reset_22 || code == ModeCommand::test_22;
 }
 /// Returns whether the reply has a position with two error bits and additional information (EnDat 2.2).
-[[nodiscard]] constexpr bool is_22(Code code) { return code == Code::position_22 || has_supplement(code); }
+[[nodiscard]] constexpr bool is_22(ModeCommand code) {
+  return code == ModeCommand::position_22 || has_supplement(code);
+}
 /// Returns whether the reply has a position.
-[[nodiscard]] constexpr bool has_position(Code code) { return code == Code::position || is_22(code); }
+[[nodiscard]] constexpr bool has_position(ModeCommand code) { return code == ModeCommand::position || is_22(code); }
+
+/// Returns the mode command that reads a position from an encoder with this format.
+[[nodiscard]] constexpr ModeCommand position_command(const Format& format) {
+  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
+}
 
 /// A request: mode command with its parameters or its supplement.
 struct Request {
-  Code code = Code::position;  ///< Mode command.
-  std::uint8_t byte = 0;       ///< MRS code, address or port; only with parameters or a supplement.
-  std::uint16_t word = 0;      ///< Value to write, or other 16 bits; only with parameters or a supplement.
+  ModeCommand code = ModeCommand::position;  ///< Mode command.
+  std::uint8_t byte = 0;                     ///< MRS code, address or port; only with parameters or a supplement.
+  std::uint16_t word = 0;  ///< Value to write, or other 16 bits; only with parameters or a supplement.
   /// Not sent: whether the host clocks on for two additional informations, of which it does not know if they are
   /// selected.
   bool seeks_infos = false;
@@ -133,16 +140,16 @@ inline constexpr std::size_t test_value_bits = 40;  ///< Bits of test values.
 inline constexpr unsigned supplement_zeros = 7;
 
 /// Returns the number of bits of a request in front of the reply.
-[[nodiscard]] constexpr std::size_t request_size(Code code) {
+[[nodiscard]] constexpr std::size_t request_size(ModeCommand code) {
   return command_bits + (has_parameters(code) ? parameter_bits : 0);
 }
 /// Returns the number of bits of the position with its error bits and its checksum.
-[[nodiscard]] constexpr std::size_t position_size(const Format& format, Code code) {
+[[nodiscard]] constexpr std::size_t position_size(const Format& format, ModeCommand code) {
   return (is_22(code) ? 2u : 1u) + with_resolution(format).bits() + crc_bits;
 }
 /// Returns the number of bits behind the start bit of the reply to `code`.
-[[nodiscard]] constexpr std::size_t reply_size(const Format& format, Code code) {
-  if (code == Code::test_values) return 1 + test_value_bits + crc_bits;
+[[nodiscard]] constexpr std::size_t reply_size(const Format& format, ModeCommand code) {
+  if (code == ModeCommand::test_values) return 1 + test_value_bits + crc_bits;
   if (!has_position(code)) return parameter_bits + crc_bits;
   return position_size(format, code) + (is_22(code) ? format.infos() * info_bits : 0);
 }
@@ -233,7 +240,7 @@ constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& 
   const auto code = static_cast<std::uint8_t>(bits.load(lead_bits, 6));
   if (!is_code(code)) return Error::unexpected_reply;
   if (bits.load(0, lead_bits) != 0) return Error::out_of_range;
-  Request request{.code = static_cast<Code>(code)};
+  Request request{.code = static_cast<ModeCommand>(code)};
   if (has_supplement(request.code)) {
     if (!take_supplement(bits, command_bits, request)) return Error::wrong_length;
     return request;
@@ -256,7 +263,7 @@ constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& 
 }
 
 /// Returns how many bits a reply still needs to be complete.
-[[nodiscard]] constexpr std::size_t missing_bits(const Format& format, Code code, const BitView& bits) {
+[[nodiscard]] constexpr std::size_t missing_bits(const Format& format, ModeCommand code, const BitView& bits) {
   const std::size_t start = find_start(bits);
   const std::size_t whole = start + 1 + reply_size(format, code);
   return whole > bits.size ? whole - bits.size : 0;
@@ -294,23 +301,23 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
   const std::size_t start = find_start(bits);
   if (start >= bits.size || bits.end_of_run(start) == bits.size) return Error::line_stuck;
   const std::size_t first = start + 1;
-  const Code code = request.code;
-  const std::size_t covered = code == Code::test_values ? 1 + test_value_bits
-                              : has_position(code)      ? position_size(format, code) - crc_bits
-                                                        : parameter_bits;
+  const ModeCommand code = request.code;
+  const std::size_t covered = code == ModeCommand::test_values ? 1 + test_value_bits
+                              : has_position(code)             ? position_size(format, code) - crc_bits
+                                                               : parameter_bits;
   if (first + covered + crc_bits > bits.size) return Error::truncated;
   if (!detail::is_checked(bits, first, covered)) return Error::bad_checksum;
   Reply reply{.start = static_cast<std::uint16_t>(request_size(code) + start)};
-  if (!has_position(code) && code != Code::test_values) {
+  if (!has_position(code) && code != ModeCommand::test_values) {
     reply.byte = static_cast<std::uint8_t>(bits.load(first, 8));
     reply.word = static_cast<std::uint16_t>(bits.load(first + 8, 16));
-    const bool repeats = code != Code::reset && code != Code::communicate;
+    const bool repeats = code != ModeCommand::reset && code != ModeCommand::communicate;
     if (repeats && reply.byte != request.byte) return Error::request_rejected;
-    if (code == Code::write && reply.word != request.word) return Error::request_rejected;
+    if (code == ModeCommand::write && reply.word != request.word) return Error::request_rejected;
     return reply;
   }
   reply.f1 = bits[first];
-  if (code == Code::test_values) {
+  if (code == ModeCommand::test_values) {
     reply.position = bits.load(first + 1, test_value_bits);
     return reply;
   }
@@ -328,7 +335,7 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
 
 /// Appends the bits of a reply from its start bit on to `bits`.
 template <class Buffer>
-constexpr void encode_reply(const Format& format, Code code, const Reply& reply, Buffer& bits) {
+constexpr void encode_reply(const Format& format, ModeCommand code, const Reply& reply, Buffer& bits) {
   static_cast<void>(bits.append(1, 1));
   const auto close = [&bits](std::size_t first) {
     const BitView view = bits.view();
@@ -336,7 +343,7 @@ constexpr void encode_reply(const Format& format, Code code, const Reply& reply,
     static_cast<void>(bits.append(crc, crc_bits));
   };
   const std::size_t first = bits.size();
-  if (code == Code::test_values) {
+  if (code == ModeCommand::test_values) {
     static_cast<void>(bits.append(reply.f1 ? 1 : 0, 1));
     static_cast<void>(bits.append(reply.position, test_value_bits));
     return close(first);
@@ -367,11 +374,11 @@ constexpr void encode_reply(const Format& format, Code code, const Reply& reply,
   BitRanges ranges;
   const std::size_t command = std::min(command_bits, burst.size);
   const auto code = static_cast<std::uint8_t>(burst.size < command_bits ? 0 : burst.load(lead_bits, 6));
-  const std::size_t size = is_code(code) ? std::min(request_size(static_cast<Code>(code)), burst.size) : command;
+  const std::size_t size = is_code(code) ? std::min(request_size(static_cast<ModeCommand>(code)), burst.size) : command;
   static_cast<void>(ranges.push_back({.first = 0, .count = size}));
-  if (!is_code(code) || !has_supplement(static_cast<Code>(code))) return ranges;
+  if (!is_code(code) || !has_supplement(static_cast<ModeCommand>(code))) return ranges;
   const BitView reply{burst.bytes.subspan(command_bits / 8), burst.size - size};
-  const std::size_t end = size + find_start(reply) + 1 + reply_size(format, static_cast<Code>(code));
+  const std::size_t end = size + find_start(reply) + 1 + reply_size(format, static_cast<ModeCommand>(code));
   if (end < burst.size) static_cast<void>(ranges.push_back({.first = end, .count = burst.size - end}));
   return ranges;
 }
@@ -397,19 +404,21 @@ constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t 
   // WRN is known from additional information only, unless a warning is set.
   const bool knows_group = warnings != 0 || (reading.alarms_reported & alarm::warning) != 0;
   reading.alarms &= alarm::error | alarm::warning;
-  reading.alarms |=
-      alarms_of(errors, warnings) | (errors != 0 ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
+  const bool wrong = errors != 0 || reading.singleturn_valid_bits == 0;
+  reading.alarms |= alarms_of(errors, warnings) | (wrong ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
   reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
   if (errors != 0) reading.singleturn_valid_bits = 0;
   reading.multiturn_valid = reading.multiturn_valid && errors == 0;
 }
 
 /// Returns whether an error bit says that the position is wrong.
-[[nodiscard]] constexpr bool has_error(Code code, const Reply& reply) { return reply.f1 || (is_22(code) && !reply.f2); }
+[[nodiscard]] constexpr bool has_error(ModeCommand code, const Reply& reply) {
+  return reply.f1 || (is_22(code) && !reply.f2);
+}
 
 /// Returns the reading of a reply; an empty one if the reply has no position. F1 and F2 say whether any error message
 /// is set, WRN says the same of warnings; without additional information warnings are unknown.
-[[nodiscard]] constexpr Reading reading_of(const Format& given, Code code, const Reply& reply) {
+[[nodiscard]] constexpr Reading reading_of(const Format& given, ModeCommand code, const Reply& reply) {
   Reading reading;
   if (!has_position(code)) return reading;
   const Format format = with_resolution(given);
@@ -422,9 +431,10 @@ constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t 
   reading.multiturn = resolution.multiturn_bits == 0 ? 0 : reply.position >> resolution.singleturn_bits;
   reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
   reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
+  // Without additional information nothing tells of warnings: which alarms are raised stays open until they are read.
+  if (reply.info_count == 0) return reading;
   reading.alarms = wrong ? alarm::error : 0;
   reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
-  if (reply.info_count == 0) return reading;
   const bool warns = reply.infos[0].warning;
   if (warns) reading.alarms |= alarm::warning;
   reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;

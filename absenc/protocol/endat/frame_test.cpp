@@ -48,8 +48,8 @@ TEST(EndatFrame, DecodesWhatItEncodes) {
       reply.infos[0] = {.warning = true, .busy = true, .number = 5, .content = static_cast<std::uint16_t>(value)};
       BitBuffer<192> line;
       line.append(0, 7);
-      encode_reply(format, Code::position_22, reply, line);
-      const Result<Reply> decoded = decode_reply(format, {.code = Code::position_22}, line.view());
+      encode_reply(format, ModeCommand::position_22, reply, line);
+      const Result<Reply> decoded = decode_reply(format, {.code = ModeCommand::position_22}, line.view());
       ASSERT_TRUE(decoded) << bits << ' ' << value;
       EXPECT_EQ(*decoded, reply) << bits << ' ' << value;
     }
@@ -59,7 +59,7 @@ TEST(EndatFrame, DecodesWhatItEncodes) {
 TEST(EndatFrame, FindsHostsBitsInABurst) {
   const Format format{.singleturn_bits = 25, .info1 = 0x45};
   BitBuffer<256> burst;
-  const Request request{.code = Code::read_22, .byte = 0x12};
+  const Request request{.code = ModeCommand::read_22, .byte = 0x12};
   burst.append(encode_request(request).view().load(0, 8), 8);
   burst.append(0, 6);
   const std::size_t start = burst.size();
@@ -78,7 +78,7 @@ TEST(EndatFrame, FindsHostsBitsInABurst) {
   EXPECT_EQ(end - start, 1 + reply_size(format, request.code));
 }
 
-// README.md, "What the checksum betrays": the least number of wrong bits that the CRC may miss, by the number of bits
+// README.md, section "Checksum": the least number of wrong bits that the CRC may miss, by the number of bits
 // that it covers, and the share of such patterns.
 TEST(EndatFrame, ChecksumBetraysEveryOddNumberOfWrongBits) {
   for (const unsigned covered : {14u, 26u, 27u, 38u, 39u, 50u, 24u}) {

@@ -11,10 +11,13 @@ namespace absenc::endat {
 
 /// Removes additional information that the format does not ask for, and returns the reading of the reply without it:
 /// another host may have selected it, and ends it as it likes.
-constexpr Reading drop_unasked(const Format& format, Code code, Reply& reply) {
+constexpr Reading drop_unasked(const Format& format, ModeCommand code, Reply& reply) {
   reply.info_count = static_cast<std::uint8_t>(std::min<std::size_t>(reply.info_count, format.infos()));
   return reading_of(format, code, reply);
 }
+
+/// How often the position is read, at most, if its error bit is set and no error message explains it.
+inline constexpr int most_tries = 3;
 
 /// Conversation that reads the position and, if an error or a warning is set, the alarms.
 class ReadPosition : public author::HostOf<Protocol> {
@@ -30,28 +33,33 @@ class ReadPosition : public author::HostOf<Protocol> {
   [[nodiscard]] const Reply& last() const { return reply_; }
 
  private:
-  enum class Step : std::uint8_t { position, area, errors, warnings };
+  enum class Stage : std::uint8_t { position, area, errors, warnings };
 
   void concluded(Error error) final {
     if (error != Error::none) return finish(error, manner().hold);
-    switch (step_) {
-      case Step::position:
+    switch (stage_) {
+      case Stage::position:
         reply_ = HostOf::last();
         new (&reading_) Reading(drop_unasked(format(), position_request_.code, reply_));  // saves a copy
         reading_.latched = begun_at();
         reading_.received = received_at();
-        if (reading_.alarms == 0) break;
-        step_ = Step::area;
-        return ask({.code = Code::select, .byte = area::status});
-      case Step::area:
-        step_ = Step::errors;
-        return ask({.code = Code::read, .byte = error_word.address});
-      case Step::errors:
+        if (reading_.alarms == 0 && reading_.singleturn_valid_bits != 0) break;
+        stage_ = Stage::area;
+        return ask({.code = ModeCommand::select, .byte = area::status});
+      case Stage::area:
+        stage_ = Stage::errors;
+        return ask({.code = ModeCommand::read, .byte = error_word.address});
+      case Stage::errors:
         errors_ = HostOf::last().word;
-        step_ = Step::warnings;
-        return ask({.code = Code::read, .byte = warning_word.address});
-      case Step::warnings:
+        stage_ = Stage::warnings;
+        return ask({.code = ModeCommand::read, .byte = warning_word.address});
+      case Stage::warnings:
         add_alarms(reading_, errors_, HostOf::last().word);
+        // An error bit without an error message may be damage that the checksum misses: the position is read again.
+        if ((reading_.alarms & (alarm::errors | alarm::warnings)) == 0 && ++tries_ < most_tries) {
+          stage_ = Stage::position;
+          return ask(position_request_);
+        }
         reply_.alarms_read = static_cast<std::uint16_t>(reading_.alarms);
         break;
     }
@@ -60,8 +68,9 @@ class ReadPosition : public author::HostOf<Protocol> {
   }
 
   Request position_request_;
-  Step step_ = Step::position;
+  Stage stage_ = Stage::position;
   bool has_reading_ = false;
+  std::uint8_t tries_ = 0;
   std::uint16_t errors_ = 0;
   Reply reply_{};
   Reading reading_{};

@@ -29,7 +29,7 @@ TEST(EndatHost, ReadsEveryLengthAtEveryClock) {
         const Format format{.singleturn_bits = bits, .clock_khz = khz, .line_delay_ns = delay};
         Bench bench(format);
         bench.shaft.place = 0x1234'5678;
-        const Result<Reply> reply = ask(bench, format, {.code = Code::position_22});
+        const Result<Reply> reply = ask(bench, format, {.code = ModeCommand::position_22});
         ASSERT_TRUE(reply) << int(bits) << ' ' << khz << ' ' << delay;
         const std::int64_t expected = bits > 32 ? std::int64_t{0x1234'5678} << (bits - 32) : 0x1234'5678 >> (32 - bits);
         EXPECT_EQ(static_cast<std::int64_t>(reply->position), expected) << int(bits) << ' ' << khz << ' ' << delay;
@@ -44,8 +44,8 @@ TEST(EndatHost, WithoutCompensationMissesTheLastBits) {
   Bench bench(delayed);
   Format host = delayed;
   host.line_delay_ns = 0;
-  EXPECT_EQ(ask(bench, host, {.code = Code::position_22}).error(), Error::truncated);
-  EXPECT_TRUE(ask(bench, delayed, {.code = Code::position_22}));
+  EXPECT_EQ(ask(bench, host, {.code = ModeCommand::position_22}).error(), Error::truncated);
+  EXPECT_TRUE(ask(bench, delayed, {.code = ModeCommand::position_22}));
 }
 
 TEST(EndatHost, KeepsRecoveryTimeOfEachVersion) {
@@ -53,9 +53,9 @@ TEST(EndatHost, KeepsRecoveryTimeOfEachVersion) {
     Format format = rotary;
     format.recovery = recovery;
     Bench bench(format);
-    ASSERT_TRUE(ask(bench, format, {.code = Code::position_22}));
+    ASSERT_TRUE(ask(bench, format, {.code = ModeCommand::position_22}));
     const Time before = bench.line.now();
-    Ask host(format, {.code = Code::position_22});
+    Ask host(format, {.code = ModeCommand::position_22});
     bench.run(host);
     EXPECT_EQ(host.begun_at() - before, recovery == Recovery::long_time ? long_recovery : short_recovery);
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
@@ -64,10 +64,10 @@ TEST(EndatHost, KeepsRecoveryTimeOfEachVersion) {
 
 TEST(EndatEncoder, IgnoresExchangeWithinRecoveryTime) {
   Bench bench(rotary);
-  ASSERT_TRUE(ask(bench, rotary, {.code = Code::position_22}));
+  ASSERT_TRUE(ask(bench, rotary, {.code = ModeCommand::position_22}));
   Format hasty = rotary;
   hasty.recovery = Recovery::short_time;
-  EXPECT_EQ(ask(bench, hasty, {.code = Code::position_22}).error(), Error::line_stuck);
+  EXPECT_EQ(ask(bench, hasty, {.code = ModeCommand::position_22}).error(), Error::line_stuck);
   EXPECT_EQ(bench.encoder.violations()[0].rule, rules::recovery);
 }
 
@@ -105,7 +105,7 @@ TEST(EndatEncoder, NamesBothWhenHostDrivesIntoTheReply) {
 }
 
 TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
-  const auto broken_at = [](std::uint32_t rate, Version version) {
+  const auto broken_at = [](std::uint32_t rate, CommandSet version) {
     Format format = rotary;
     format.version = version;
     Bench bench(format);
@@ -114,10 +114,10 @@ TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
     bench.run(host);
     return bench.encoder.violation_count() == 0 ? std::string() : std::string(bench.encoder.violations()[0].rule);
   };
-  EXPECT_EQ(broken_at(2'000'000, Version::v21), "");
-  EXPECT_EQ(broken_at(2'100'000, Version::v21), rules::fastest);
-  EXPECT_EQ(broken_at(8'000'000, Version::v22), "");
-  EXPECT_EQ(broken_at(90'000, Version::v22), rules::slowest);
+  EXPECT_EQ(broken_at(2'000'000, CommandSet::v21), "");
+  EXPECT_EQ(broken_at(2'100'000, CommandSet::v21), rules::fastest);
+  EXPECT_EQ(broken_at(8'000'000, CommandSet::v22), "");
+  EXPECT_EQ(broken_at(90'000, CommandSet::v22), rules::slowest);
 }
 
 }  // namespace

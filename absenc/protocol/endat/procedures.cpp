@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/endat/procedures.hpp"
 
-#include <bit>
-
 #include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/endat/access.hpp"
 #include "absenc/protocol/endat/host.hpp"
 
 namespace absenc::endat {
@@ -11,174 +10,6 @@ namespace absenc::endat {
 using namespace author;
 
 namespace {
-
-Code position_code(const Format& format) { return format.version == Version::v21 ? Code::position : Code::position_22; }
-
-// ---- Words of the memory by commands of EnDat 2.1
-
-// Selects an area, unless `selected` has its MRS code, which is the last one that this procedure selected.
-Part<bool> select(Dialog& dialog, std::uint8_t& selected, std::uint8_t mrs, std::string_view step) {
-  if (selected == mrs) co_return true;
-  const Result<Reply> reply = co_await dialog.attempt({.code = Code::select, .byte = mrs});
-  if (reply.error() == Error::request_rejected) {
-    co_await dialog.stop({Error::unsupported, "the encoder does not have this memory area"});
-  }
-  if (!reply) co_await dialog.stop({reply.error(), step});
-  selected = mrs;
-  co_return true;
-}
-
-Part<std::uint16_t> read_word_21(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
-  co_await select(dialog, selected, word.mrs, step);
-  const Reply reply = co_await dialog.ask({.code = Code::read, .byte = word.address}).or_say(step);
-  co_return reply.word;
-}
-
-// ---- Words of the memory by commands of EnDat 2.2
-
-// Additional informations that the encoder sent when a procedure began: their MRS codes, 0 if there was none.
-struct Selection {
-  std::uint8_t info1 = 0;
-  std::uint8_t info2 = 0;
-
-  friend bool operator==(const Selection&, const Selection&) = default;
-};
-
-std::uint8_t code_of(const Info* info) { return info == nullptr ? 0 : static_cast<std::uint8_t>(0x40 | info->number); }
-
-// Finds out which informations are selected: a supplement would collide with one that the host does not know of. Two
-// positions in a row must agree, because ones behind the position, as a damaged line gives them, mean none.
-Part<Selection> find_selection(Dialog& dialog) {
-  Selection found;
-  for (bool first = true;; first = false) {
-    const Reply reply = co_await dialog.ask({.code = Code::position_22, .seeks_infos = true});
-    const Selection now{code_of(reply.info(1)), code_of(reply.info(2))};
-    if (!first && now == found) break;
-    found = now;
-  }
-  Format format = dialog.format();
-  format.info1 = found.info1;
-  format.info2 = found.info2;
-  dialog.set_format(format);
-  co_return found;
-}
-
-// Selects a memory area or, with an MRS code from 40 to 5F, an additional information.
-Part<bool> select_22(Dialog& dialog, std::uint8_t mrs, std::string_view step) {
-  co_await dialog.ask({.code = Code::select_22, .byte = mrs}).or_say(step);
-  Format format = dialog.format();
-  constexpr std::uint8_t stop = 0x0F;
-  if (mrs >> 4 == 4) format.info1 = (mrs & 0x0F) == stop ? 0 : mrs;
-  if (mrs >> 4 == 5) format.info2 = (mrs & 0x0F) == stop ? 0 : mrs;
-  dialog.set_format(format);
-  co_return true;
-}
-
-// Selects what was selected when the procedure began.
-Part<bool> restore(Dialog& dialog, Selection before) {
-  constexpr std::string_view step = "it was done, but the additional information from before is not selected again";
-  if (dialog.format().info1 != before.info1) {
-    co_await select_22(dialog, before.info1 != 0 ? before.info1 : std::uint8_t{mrs::stop_info_1}, step);
-  }
-  if (dialog.format().info2 != before.info2) {
-    co_await select_22(dialog, before.info2 != 0 ? before.info2 : std::uint8_t{mrs::stop_info_2}, step);
-  }
-  co_return true;
-}
-
-// Reads a position until the encoder is no longer busy with its memory. Returns additional information 1.
-Part<Info> wait_until_ready(Dialog& dialog, std::string_view step) {
-  const Time limit = dialog.received_at() + memory_access_time;
-  for (;;) {
-    const Reply reply = co_await dialog.ask({.code = Code::position_22}).or_say(step);
-    const Info* const info = reply.info(1);
-    if (info == nullptr) co_await dialog.stop({Error::unexpected_reply, "the encoder sends no additional information"});
-    if (!info->busy) co_return *info;
-    if (dialog.received_at() > limit) co_await dialog.stop({Error::busy, step});
-  }
-}
-
-// Reads additional information 1 with the MRS code `wanted`.
-Part<std::uint16_t> read_info_1(Dialog& dialog, std::uint8_t wanted, std::string_view step) {
-  co_await select_22(dialog, wanted, step);
-  const Info info = co_await wait_until_ready(dialog, step);
-  if (info.number != (wanted & 0x1F)) {
-    co_await dialog.stop({Error::request_rejected, "the encoder does not have this additional information"});
-  }
-  co_return info.content;
-}
-
-// Selects a memory area and verifies by the acknowledgement that the encoder has it.
-Part<bool> select_area_22(Dialog& dialog, std::uint8_t area, std::string_view step) {
-  co_await select_22(dialog, mrs::nothing, step);
-  co_await select_22(dialog, area, step);
-  const std::uint16_t acknowledged = co_await read_info_1(dialog, mrs::acknowledge_mrs, step);
-  if (acknowledged >> 8 != area)
-    co_await dialog.stop({Error::unsupported, "the encoder does not have this memory area"});
-  co_return true;
-}
-
-Part<std::uint16_t> read_word_22(Dialog& dialog, std::uint8_t address, std::string_view step) {
-  co_await dialog.ask({.code = Code::read_22, .byte = address}).or_say(step);
-  const std::uint16_t low = co_await read_info_1(dialog, mrs::memory_low, step);
-  const std::uint16_t high = co_await read_info_1(dialog, mrs::memory_high, step);
-  if (low >> 8 != address || high >> 8 != address) {
-    co_await dialog.stop({Error::request_rejected, "the encoder acknowledged another address"});
-  }
-  co_return static_cast<std::uint16_t>((high & 0xFF) << 8 | (low & 0xFF));
-}
-
-// ---- Resolution
-
-// The highest position of a single bit, or no bits for a number that is no power of two.
-unsigned bits_of_power(std::uint32_t number) {
-  return std::has_single_bit(number) ? static_cast<unsigned>(std::countr_zero(number)) : 0;
-}
-
-std::uint32_t joined(std::uint16_t low, std::uint16_t high) { return std::uint32_t{high} << 16 | low; }
-
-// Asks the encoder for its resolution, if the options do not state it.
-Part<bool> know_resolution(Dialog& dialog) {
-  if (dialog.format().is_known()) co_return true;
-  constexpr std::string_view step = "the encoder's parameters could not be read";
-  std::uint8_t selected = 0;
-  const std::uint16_t count = co_await read_word_21(dialog, selected, clock_count_word, step);
-  const std::uint16_t type = co_await read_word_21(dialog, selected, type_word, step);
-  const std::uint16_t revolutions = co_await read_word_21(dialog, selected, revolutions_word, step);
-  const std::uint16_t steps_low = co_await read_word_21(dialog, selected, steps_word, step);
-  const std::uint16_t steps_high = co_await read_word_21(dialog, selected, steps_high_word, step);
-  const std::uint32_t steps = joined(steps_low, steps_high);
-  Format format = dialog.format();
-  const unsigned bits = count & 0x3F;
-  if ((type & rotary_type) == 0) {
-    format.position_bits = static_cast<std::uint8_t>(bits);
-    format.unit_pm = std::int64_t{steps} * 1000;
-  } else {
-    format.multiturn_bits = static_cast<std::uint8_t>(bits_of_power(revolutions));
-    format.singleturn_bits = static_cast<std::uint8_t>(bits_of_power(steps));
-  }
-  if (!format.is_known() || bits > most_bits) {
-    co_await dialog.stop({Error::unsupported, "the encoder's measuring steps are no power of two",
-                          "set the options singleturn_bits and multiturn_bits, or position_bits and unit_um"});
-  }
-  if (format.bits() != bits) {
-    co_await dialog.stop({Error::cross_check_failed,
-                          "the encoder's steps and revolutions do not give the number of bits that it states",
-                          "set the options singleturn_bits and multiturn_bits"});
-  }
-  dialog.set_format(format);
-  co_await dialog.rest(long_recovery);
-  co_return true;
-}
-
-Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
-  Reply reply = co_await dialog.ask({.code = position_code(dialog.format())});
-  found.reading = drop_unasked(dialog.format(), dialog.request().code, reply);
-  found.reading.latched = dialog.begun_at();
-  found.reading.received = dialog.received_at();
-  static_cast<Values&>(found) = values_of(dialog.format(), dialog.request(), reply);
-  co_return found.reading;
-}
 
 // Reads error messages and warnings, and adds them to `found`.
 Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
@@ -199,8 +30,13 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
 
 Procedure read_position(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
-  const Reading reading = co_await look(dialog, found);
-  if (reading.alarms != 0) co_await read_alarms(dialog, found);
+  for (int tries = 0; tries < most_tries; ++tries) {
+    const Reading reading = co_await look(dialog, found);
+    if (reading.alarms == 0 && reading.singleturn_valid_bits != 0) break;
+    // An error bit without an error message may be damage that the checksum misses: the position is read again.
+    const std::uint32_t alarms = co_await read_alarms(dialog, found);
+    if ((alarms & (alarm::errors | alarm::warnings)) != 0) break;
+  }
   co_return done;
 }
 
@@ -217,7 +53,7 @@ Procedure clear_alarms(Dialog& dialog, ProcedureResult& found) {
   co_await select(dialog, selected, area::status, "nothing was cleared");
   for (const WordPlace word : {error_word, warning_word}) {
     // If the reply is lost, the alarms that are read afterwards show whether they were cleared.
-    static_cast<void>(co_await dialog.attempt({.code = Code::write, .byte = word.address, .word = 0}).changes());
+    static_cast<void>(co_await dialog.attempt({.code = ModeCommand::write, .byte = word.address, .word = 0}).changes());
   }
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
@@ -287,9 +123,9 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
   found.bits = static_cast<std::uint8_t>(count & 0x3F);
   found.type = type;
   found.kind = kind_of(type);
-  found.periods = joined(periods_low, periods_high);
+  found.periods = double_word(periods_low, periods_high);
   found.revolutions = revolutions;
-  found.steps = joined(steps_low, steps_high);
+  found.steps = double_word(steps_low, steps_high);
   found.speaks_22 = (set & 3) == 1;
   found.id = found.words.view().first(6);
   found.serial = found.words.view().subspan(6, 6);
@@ -301,109 +137,10 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
   co_return done;
 }
 
-// ---- Memory
-
-namespace {
-
-Part<std::uint16_t> read_any_word(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step) {
-  if (dialog.format().version == Version::v21) co_return co_await read_word_21(dialog, selected, word, step);
-  if (selected != word.mrs) co_await select_area_22(dialog, word.mrs, step);
-  selected = word.mrs;
-  co_return co_await read_word_22(dialog, word.address, step);
-}
-
-// Prepares for accesses to the memory: EnDat 2.2 needs to know what is selected, and the length of a position.
-Part<Selection> begin_access(Dialog& dialog) {
-  if (dialog.format().version == Version::v21) co_return Selection{};
-  co_await know_resolution(dialog);
-  co_return co_await find_selection(dialog);
-}
-Part<bool> end_access(Dialog& dialog, Selection before) {
-  if (dialog.format().version == Version::v22) co_await restore(dialog, before);
-  co_await dialog.rest(long_recovery);
-  co_return true;
-}
-
-constexpr std::string_view no_such_word = "the memory has no such word: `absenc list endat` shows the areas";
-
-}  // namespace
-
-Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
-  const auto mrs = static_cast<std::uint8_t>(arguments[0]);
-  const auto first = static_cast<std::uint8_t>(arguments[1]);
-  const std::int64_t count = arguments[2];
-  const MemoryArea* const area = find_word(mrs, first);
-  if (area == nullptr || arguments[1] + count > area->first + area->count) {
-    co_return {Error::invalid_argument, no_such_word};
-  }
-  const Selection before = co_await begin_access(dialog);
-  std::uint8_t selected = 0;
-  for (std::int64_t i = 0; i < count; ++i) {
-    const WordPlace place{mrs, static_cast<std::uint8_t>(first + i)};
-    const std::uint16_t word = co_await read_any_word(dialog, selected, place, "");
-    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word)));
-    static_cast<void>(found.words.push_back(static_cast<std::uint8_t>(word >> 8)));
-    if (i == 0) found.value = word;
-  }
-  co_await end_access(dialog, before);
-  found.area = mrs;
-  found.address = first;
-  if (count > 1) found.data = found.words.view();
-  co_return done;
-}
-
-namespace {
-
-// Writes a word and verifies it by reading it back; does nothing if the encoder has the value already.
-Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::uint16_t value) {
-  const std::uint16_t before = co_await read_any_word(dialog, selected, place, "nothing was written");
-  if (before == value) co_return false;
-  const bool by_22 = dialog.format().version == Version::v22;
-  const Request request{.code = by_22 ? Code::write_22 : Code::write, .byte = place.address, .word = value};
-  // If the reply to the write is lost, reading the word back shows whether it was written.
-  const Result<Reply> written = co_await dialog.attempt(request).changes();
-  if (written.error() == Error::request_rejected) {
-    dialog.refused();
-    co_await dialog.stop(
-        {Error::request_rejected, "the encoder refuses to write this word: it may be write-protected"});
-  }
-  if (by_22) {
-    co_await wait_until_ready(dialog, "the word was written, but could not be read back");
-  } else {
-    co_await dialog.rest(memory_access_time);
-  }
-  const std::uint16_t now =
-      co_await read_any_word(dialog, selected, place, "the word was written, but could not be read back");
-  if (now == value) co_return true;
-  if (now == before) dialog.refused();
-  co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
-                        "look at what is there with `absenc memory read` before you write it again"});
-  co_return false;
-}
-
-}  // namespace
-
-Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
-  const WordPlace place{static_cast<std::uint8_t>(arguments[0]), static_cast<std::uint8_t>(arguments[1])};
-  const MemoryArea* const area = find_word(place.mrs, static_cast<unsigned>(arguments[1]));
-  if (area == nullptr) co_return {Error::invalid_argument, no_such_word};
-  if (!area->writable) {
-    co_return {Error::invalid_argument, "this area belongs to the encoder's maker and is write-protected"};
-  }
-  found.area = place.mrs;
-  found.address = place.address;
-  found.value = static_cast<std::uint16_t>(arguments[2]);
-  const Selection before = co_await begin_access(dialog);
-  std::uint8_t selected = 0;
-  found.written = co_await store(dialog, selected, place, *found.value);
-  co_await end_access(dialog, before);
-  co_return done;
-}
-
 // ---- Resets, zero, recovery time
 
 Procedure reset(Dialog& dialog, ProcedureResult& found) {
-  static_cast<void>(co_await dialog.ask({.code = Code::reset}).changes());
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset}).changes());
   co_await dialog.rest(reset_time);
   // A reset ends the selection of additional information.
   Format format = dialog.format();
@@ -417,13 +154,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found) {
 Procedure reset_errors(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   co_await find_selection(dialog);
-  static_cast<void>(co_await dialog.ask({.code = Code::error_reset_22}).changes());
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::error_reset_22}).changes());
   Format format = dialog.format();
   format.info1 = format.info2 = 0;
   dialog.set_format(format);
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
-  if (has_error(Code::position_22, dialog.last())) {
+  if (has_error(ModeCommand::position_22, dialog.last())) {
     co_return {Error::cross_check_failed, "an error remains",
                "`absenc run ... status` names it, then `absenc clear-alarms`"};
   }
@@ -436,7 +173,7 @@ namespace {
 Part<std::uint64_t> counts_of_period(Dialog& dialog, std::uint8_t& selected) {
   const std::uint16_t low = co_await read_word_21(dialog, selected, periods_word, "nothing was changed");
   const std::uint16_t high = co_await read_word_21(dialog, selected, periods_high_word, "nothing was changed");
-  const std::uint64_t periods = joined(low, high);
+  const std::uint64_t periods = double_word(low, high);
   const Format& format = dialog.format();
   if (periods == 0) co_return 0;
   // A linear encoder states the length of a signal period in nm.
@@ -467,35 +204,30 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
   const std::uint64_t period = co_await counts_of_period(dialog, selected);
   if (period == 0) {
     co_return {Error::unsupported,
-               "the encoder states no signal period, in which its datum shift is counted; nothing was changed"};
+               "the encoder states no signal period, in which its datum shift is counted; nothing was changed",
+               "store the zero as an offset in the drive"};
   }
   const std::uint16_t low = co_await read_word_21(dialog, selected, shift_word, "nothing was changed");
   const std::uint16_t high = co_await read_word_21(dialog, selected, shift_high_word, "nothing was changed");
   // Rounded to the nearest signal period, so the new position may be up to half a period away from 0.
   const auto by = static_cast<std::uint32_t>((second.singleturn + period / 2) / period);
-  const std::uint32_t before = joined(low, high);
+  const std::uint32_t before = double_word(low, high);
   const std::uint32_t wanted = dialog.format().datum_shift == DatumShift::subtracted ? before + by : before - by;
   const std::array<WordPlace, 2> places{shift_word, shift_high_word};
   const std::array<std::uint16_t, 2> values{static_cast<std::uint16_t>(wanted),
                                             static_cast<std::uint16_t>(wanted >> 16)};
-  co_await select(dialog, selected, area::operating, "nothing was changed");
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const Request request{.code = Code::write, .byte = places[i].address, .word = values[i]};
-    const Result<Reply> reply = co_await dialog.attempt(request).changes();
-    if (reply.error() == Error::request_rejected) {
-      co_return {Error::request_rejected,
-                 "the encoder refuses another datum shift: its operating parameters may be write-protected"};
-    }
-    co_await dialog.rest(memory_access_time);
-    const std::uint16_t now =
-        co_await read_word_21(dialog, selected, places[i], "the datum shift was written, but could not be read back");
+    const std::uint16_t now = co_await write_word_21(dialog, selected, places[i], values[i],
+                                                     "the datum shift was written, but could not be read back");
     if (now != values[i]) {
-      co_return {Error::cross_check_failed, "the encoder has another datum shift than was written",
-                 "read words 0 and 1 of area 0xA7 with `absenc memory read`"};
+      co_return {
+          Error::cross_check_failed,
+          "the encoder has another datum shift than was written: its operating parameters may be write-protected",
+          "read words 0 and 1 of area 0xA7 with `absenc memory read`"};
     }
   }
-  static_cast<void>(
-      co_await dialog.ask({.code = Code::reset}).or_say("the datum shift is stored and holds after the next start"));
+  static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset})
+                        .or_say("the datum shift is stored and holds after the next start"));
   co_await dialog.rest(reset_time);
   Format format = dialog.format();
   format.info1 = format.info2 = 0;
@@ -523,6 +255,11 @@ Procedure read_recovery(Dialog& dialog, ProcedureResult& found) {
 Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   std::uint8_t selected = 0;
   const std::uint16_t before = co_await read_word_21(dialog, selected, initialisation_word, "nothing was changed");
+  // The other bits of the word are written back as they were read, and the checksum misses one damaged reply of 32.
+  if (co_await read_word_21(dialog, selected, initialisation_word, "nothing was changed") != before) {
+    co_return {Error::cross_check_failed, "two reads of the recovery time disagree; nothing was changed",
+               "check wiring and clock rate, then try again"};
+  }
   const std::uint16_t bits = arguments[0] == 0 ? long_recovery_bits : short_recovery_bits;
   const auto wanted = static_cast<std::uint16_t>((before & ~recovery_mask) | bits);
   found.recovery = static_cast<std::uint8_t>(arguments[0]);
@@ -531,12 +268,8 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
     co_await dialog.rest(long_recovery);
     co_return done;
   }
-  const Request request{.code = Code::write, .byte = initialisation_word.address, .word = wanted};
-  // If the reply to the write is lost, reading the word back shows whether it was written.
-  static_cast<void>(co_await dialog.attempt(request).changes());
-  co_await dialog.rest(memory_access_time);
-  const std::uint16_t now = co_await read_word_21(dialog, selected, initialisation_word,
-                                                  "the recovery time was written, but could not be read back");
+  const std::uint16_t now = co_await write_word_21(dialog, selected, initialisation_word, wanted,
+                                                   "the recovery time was written, but could not be read back");
   co_await dialog.rest(long_recovery);
   if (now == wanted) co_return done;
   if (now == before) dialog.refused();
@@ -548,9 +281,10 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   co_await know_resolution(dialog);
-  const Selection before = co_await find_selection(dialog);
+  const SelectedInfos before = co_await find_selection(dialog);
   for (const std::int64_t code : arguments) {
-    if (code != 0) co_await select_22(dialog, static_cast<std::uint8_t>(code), "the information could not be selected");
+    if (code == 0) continue;
+    co_await select_22(dialog, static_cast<std::uint8_t>(code), "the information could not be selected");
     co_await find_selection(dialog);
   }
   co_await look(dialog, found);
@@ -566,7 +300,7 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
 
 Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
-  const Selection before = co_await find_selection(dialog);
+  const SelectedInfos before = co_await find_selection(dialog);
   co_await select_22(dialog, mrs::nothing, "");
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
@@ -585,7 +319,7 @@ Part<std::size_t> clocks_at(Dialog& dialog, std::uint16_t khz) {
   dialog.set_format(format);
   std::size_t first = 0;
   for (int i = 0; i < 3; ++i) {
-    const Reply reply = co_await dialog.ask({.code = position_code(dialog.format()), .seeks_infos = true});
+    const Reply reply = co_await dialog.ask({.code = position_command(dialog.format()), .seeks_infos = true});
     if (i > 0 && reply.start != first) co_return 0;
     first = reply.start;
   }
@@ -607,7 +341,8 @@ Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
   if (co_await clocks_at(dialog, low) != earliest) {
     dialog.set_format(given);
     co_return {Error::unsupported,
-               "the start bit is late even at 100 kHz: the position takes too long to be calculated"};
+               "the start bit is late even at 100 kHz: the position takes too long to be calculated",
+               "compute the delay from the cable (10 ns for each metre) and the transceivers, and set line_delay_ns"};
   }
   if (high > low && co_await clocks_at(dialog, high) == earliest) low = high;
   while (high - low > low / 50 + 1) {

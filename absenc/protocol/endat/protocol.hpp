@@ -11,7 +11,7 @@ namespace absenc::endat {
 
 /// Returns the rate of the clock for a command: the lowest one for parameters, so that the clocks that an access may
 /// take are few.
-[[nodiscard]] constexpr std::uint32_t rate_of(const Format& format, Code code) {
+[[nodiscard]] constexpr std::uint32_t rate_of(const Format& format, ModeCommand code) {
   return has_parameters(code) ? memory_rate : std::uint32_t{format.clock_khz} * 1000;
 }
 /// Returns the number of clocks of this rate that begin within `time`.
@@ -45,14 +45,14 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) { return {.pause = long_recovery}; }
   /// Returns how a request is repeated: those that only read are, twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    const Code code = request.code;
-    const bool reads = code == Code::position || code == Code::position_22 || code == Code::read ||
-                       code == Code::select || code == Code::test_values;
+    const ModeCommand code = request.code;
+    const bool reads = code == ModeCommand::position || code == ModeCommand::position_22 || code == ModeCommand::read ||
+                       code == ModeCommand::select || code == ModeCommand::test_values;
     return {.repeats = reads ? 2u : 0u, .hold = has_parameters(code) ? memory_access_time : Time{}};
   }
   /// Returns the bits of a request, and how its reply is clocked.
   static constexpr author::BitRequest encode(const Format& format, const Request& request) {
-    const Code code = request.code;
+    const ModeCommand code = request.code;
     const std::uint32_t rate = rate_of(format, code);
     author::BitRequest encoded{
         .bits = encode_request(request),

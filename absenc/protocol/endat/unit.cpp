@@ -73,13 +73,10 @@ constexpr std::array<Argument, 2> test_arguments{
 constexpr std::array<Argument, 2> communicate_arguments{
     {{"port", "address of the encoder", 0, 255}, {"instruction", "16 bits", 0, 0xFFFF}}};
 
-constexpr Code code_of_position(const Format& format) {
-  return format.version == Version::v21 ? Code::position : Code::position_22;
-}
-constexpr Request ask_for_position(const Format& format) { return {.code = code_of_position(format)}; }
+constexpr Request ask_for_position(const Format& format) { return {.code = position_command(format)}; }
 constexpr Request ask_for_position_with(const Format& format, Arguments) { return ask_for_position(format); }
-constexpr Request ask_for_test_values(const Format&) { return {.code = Code::test_values}; }
-template <Code code>
+constexpr Request ask_for_test_values(const Format&) { return {.code = ModeCommand::test_values}; }
+template <ModeCommand code>
 constexpr Request ask_with(const Format&, Arguments arguments) {
   return {.code = code,
           .byte = static_cast<std::uint8_t>(arguments.empty() ? 0 : arguments[0]),
@@ -87,16 +84,16 @@ constexpr Request ask_with(const Format&, Arguments arguments) {
 }
 template <std::uint8_t mrs>
 constexpr Request ask_to_select(const Format&, Arguments) {
-  return {.code = Code::select, .byte = mrs};
+  return {.code = ModeCommand::select, .byte = mrs};
 }
 // A command that begins by selecting the area of its first argument.
 constexpr Request ask_for_area(const Format& format, Arguments arguments) {
-  if (format.version == Version::v22) return {.code = Code::position_22};
-  return {.code = Code::select, .byte = static_cast<std::uint8_t>(arguments[0])};
+  if (format.version == CommandSet::v22) return {.code = ModeCommand::position_22};
+  return {.code = ModeCommand::select, .byte = static_cast<std::uint8_t>(arguments[0])};
 }
 
 constexpr std::string_view no_22(const Format& format) {
-  return format.version == Version::v21 ? "this needs EnDat 2.2 (option version)" : "";
+  return format.version == CommandSet::v21 ? "this needs EnDat 2.2 (option version)" : "";
 }
 constexpr bool is_asked(const Format& format) { return !format.is_known(); }
 
@@ -108,7 +105,7 @@ constexpr CommandOf<Protocol> run(const Command& info) {
 constexpr Command read_info_of{"position", Verb::read, 0, "position, turns and error bits"};
 
 // A command that sends one request with its arguments, and whose reply is the result.
-template <Code code>
+template <ModeCommand code>
 Procedure send(Dialog& dialog, ProcedureResult& result, Arguments arguments) {
   const Reply reply = co_await dialog.ask(ask_with<code>(dialog.format(), arguments)).changes();
   co_await dialog.rest(long_recovery);
@@ -141,7 +138,7 @@ constexpr auto commands = std::array{
          {},
          true,
          false}),
-    run<reset, ask_with<Code::reset>>(
+    run<reset, ask_with<ModeCommand::reset>>(
         {"reset", Verb::run, 0, "reset the encoder, as power off and on", {}, true, false}),
     run<reset_errors, ask_for_position_with>(
         {"error-reset", Verb::run, 0, "reset errors within a control cycle", {}, true, false})
@@ -163,9 +160,9 @@ constexpr auto commands = std::array{
                                                     .changes_option = "recovery"})
         .unless(no_22),
     reading<report, ask_for_test_values>({"test-values", Verb::run, 0, "test values of the encoder"}),
-    run<send<Code::test>, ask_with<Code::test>>(
+    run<send<ModeCommand::test>, ask_with<ModeCommand::test>>(
         {"test-command", Verb::run, 0, "send a test command to a port", test_arguments, true, false}),
-    run<send<Code::communicate>, ask_with<Code::communicate>>(
+    run<send<ModeCommand::communicate>, ask_with<ModeCommand::communicate>>(
         {"communicate", Verb::run, 0, "send a communication command", communicate_arguments, true, false}),
     run<measure_delay, ask_for_position_with>(
         {"line-delay", Verb::run, 0, "measure the delay of line and transceivers"}),
@@ -198,10 +195,10 @@ constexpr auto options = OptionsOf{
 
 constexpr auto models = std::array{
     ModelText{"asked", "resolution asked from the encoder", 0, "singleturn_bits=0"},
-    ModelText{"ECN-1325", "rotary, 25 bits, EnDat 2.2", 12'000, "singleturn_bits=25"},
-    ModelText{"EQN-1337", "rotary, 25 bits, 4096 turns, EnDat 2.2", 12'000, "singleturn_bits=25 multiturn_bits=12"},
-    ModelText{"ECN-1313", "rotary, 13 bits, EnDat 2.1", 12'000, "singleturn_bits=13 version=2.1"},
-    ModelText{"EQN-1325", "rotary, 13 bits, 4096 turns, EnDat 2.1", 12'000,
+    ModelText{"ECN-1325", "rotary, 25 bits, EnDat 2.2", 0, "singleturn_bits=25"},
+    ModelText{"EQN-1337", "rotary, 25 bits, 4096 turns, EnDat 2.2", 0, "singleturn_bits=25 multiturn_bits=12"},
+    ModelText{"ECN-1313", "rotary, 13 bits, EnDat 2.1", 0, "singleturn_bits=13 version=2.1"},
+    ModelText{"EQN-1325", "rotary, 13 bits, 4096 turns, EnDat 2.1", 0,
               "singleturn_bits=13 multiturn_bits=12 version=2.1"},
     ModelText{"LC-415", "linear, 32 bits of 10 nm, EnDat 2.2", 0, "singleturn_bits=0 position_bits=32 unit_um=0.01"},
 };
@@ -212,7 +209,7 @@ constexpr bool is_possible(const Format& format) {
   const bool both = format.is_linear() && format.singleturn_bits + format.multiturn_bits != 0;
   const bool is_scaled = !format.is_linear() || format.unit_pm > 0;
   return selects_1 && selects_2 && !both && is_scaled && format.bits() <= most_bits &&
-         (format.version == Version::v22 || std::uint32_t{format.clock_khz} * 1000 <= fastest_21);
+         (format.version == CommandSet::v22 || std::uint32_t{format.clock_khz} * 1000 <= fastest_21);
 }
 
 constexpr Resolution resolution_by(const Format& format) { return with_resolution(format).resolution(); }

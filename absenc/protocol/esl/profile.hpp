@@ -51,9 +51,8 @@ struct Profile {
   /// Bit in which RS1, the lowest bit of the redundant position, is sent beside the sequence counter SC2.
   RedundantBit rs1_sc2 = RedundantBit::b7;
   SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters change from reply to reply.
-  ParityScope parity_scope =
-      /// Bits of the control field (CF) that its parity bit covers: the data ID, or the encoder address too.
-      ParityScope::command;
+  /// Bits of the control field (CF) that its parity bit covers: the data ID, or the encoder address too.
+  ParityScope parity_scope = ParityScope::command;
   FieldOrder status_order = FieldOrder::document;  ///< Order of the bits in the status field (SF).
   /// Order of the bits in the address field (ADF), which has the memory address and the busy bit.
   FieldOrder memory_address_order = FieldOrder::document;

@@ -124,6 +124,10 @@ Conformance judge_on_spidev(const std::string& text, const Invocation& invocatio
 }
 
 void check_place(const Unit& unit, const Invocation& invocation) {
+  if (unit.link == LinkKind::clocked_bidirectional) {
+    throw UsageError(fmt::format("{} ({}): no port here takes the encoder's side of a data line that turns", unit.id,
+                                 line_of(unit)));
+  }
   const bool is_spi = host_clocks(unit.link);
   const bool elsewhere = invocation.has("--pty") || invocation.has("--tcp") || invocation.has("--can");
   if (is_spi && (elsewhere || !invocation.has("--spidev"))) {

@@ -94,6 +94,11 @@ void check_gap(const Unit& unit, const Invocation& invocation) {
 }
 
 void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
+  if (unit.link == LinkKind::clocked_bidirectional) {
+    throw UsageError(
+        fmt::format("{0} ({1}): no port here takes the encoder's side of a data line that turns: use sim:{0}", unit.id,
+                    line_of(unit)));
+  }
   const bool is_spi = host_clocks(unit.link);
   const bool is_can = unit.link == LinkKind::can;
   const std::array<Where, 5> places{{{"--pty", "a serial line", !is_spi},

@@ -183,7 +183,8 @@ int run_identify(const Invocation& invocation) {
 
 constexpr std::array<Parameter, 10> identify_parameters{{
     {"where", "",
-     "a port: /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0, can0 or slcan:/dev/ttyACM0, with its settings behind ?; "
+     "a port: /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0, ftdi, can0 or slcan:/dev/ttyACM0, with its settings "
+     "behind ?; "
      "or a capture file, as for `absenc decode`"},
     {"--hex", "FRAME", "instead: a reply that was captured, as for `absenc decode`", "", false, true},
     {"--request", "FRAME", "what it answers, one for each --hex in the same order; \"\": not known", "", false, true},

@@ -162,6 +162,8 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
+  /// Returns the clock rate in Hz of the last transfer; 0: the port makes no clock.
+  [[nodiscard]] std::uint32_t clock_rate() const { return encoder_->clock_rate(); }
   /// Returns the resolution that the encoder has reported; before its first report, that of the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
@@ -234,10 +236,14 @@ int run_info(const Invocation& invocation) {
   for (const Command* command : questions(*uri.unit, uri.options)) survey.ask(*command);
   if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
   const bool good = survey.troubles.empty();
+  const std::uint32_t clock = survey.clock_rate();
   if (json) {
-    print_line(identity_json(uri, survey.resolution()).set("answers", survey.answers).set("ok", good).line());
+    Json line = identity_json(uri, survey.resolution());
+    if (clock != 0) line.set("clock_hz", clock);
+    print_line(line.set("answers", survey.answers).set("ok", good).line());
   } else {
     Rows rows{{"resolution", resolution_text(survey.resolution())}};
+    if (clock != 0) rows.push_back({"clock", fmt::format("{} Hz", clock)});
     if (all) print_line(table(std::exchange(rows, {})) + '\n');
     rows.insert(rows.end(), survey.rows.begin(), survey.rows.end());
     print_line(table(rows) + survey.below);

@@ -48,8 +48,18 @@ std::string text_of_serial(const client::FoundPort& listed) {
   return text + fmt::format("  free; next: {}\n", listed.next_command());
 }
 
+std::string text_of_clock(const client::FoundPort& listed) {
+  const ListedPort& port = listed.serial;
+  const os::AdapterChip* chip = port.usb ? os::chip_of(*port.usb) : nullptr;
+  std::string text = fmt::format("{}: {}\n  chip {}: a clock for BiSS, SSI and EnDat\n", listed.path,
+                                 adapter_text(port), chip != nullptr ? chip->name : "of FTDI");
+  if (!port.refusal.empty()) return text + fmt::format("  {}\n", port.refusal);
+  return text + fmt::format("  next: {}\n", listed.next_command());
+}
+
 std::string text_of(const client::FoundPort& port) {
   if (port.kind == "serial") return text_of_serial(port);
+  if (port.kind == "ftdi") return text_of_clock(port);
   const std::string_view words = port.kind == "can" ? "a CAN interface" : "an SPI controller";
   return fmt::format("{}: {}\n  next: {}\n", port.path, words, port.next_command());
 }
@@ -62,7 +72,8 @@ int run_ports(const Invocation& invocation) {
     print_line(text);
   } else if (!json) {
     print_line(
-        "This computer has no serial port, no CAN interface and no SPI controller: is the adapter plugged in?\n"
+        "This computer has no serial port, no CAN interface, no SPI controller and no FTDI clock: is the adapter "
+        "plugged in?\n"
         "Without hardware: absenc read sim:tformat");
   }
   return exit_good;
