@@ -134,11 +134,15 @@ void FtdiPort::exchange(const ByteStep& step, TransferResult& received) {
 }
 
 // A pause on the clock line is made by time, between two USB transfers: an MPSSE has clocks without data (0x8E and
-// 0x8F), but they move the clock pin, and it has no command that only waits.
+// 0x8F), but they move the clock pin, and it has no command that only waits. The encoder measures its timeout from the
+// falling edge, which comes late if this thread does. So the chip replies when the clock is low, and the clock stays low
+// for as long as the host wanted from then on.
 void FtdiPort::hold_low(Time until) {
+  const Time wanted = until - end_;
   commands_.set_pins(rest() ^ MpssePin::clock);
+  commands_.read_pins();
   send(0);
-  reach(until);
+  reach(os::now() + wanted);
   commands_.clear();
   commands_.set_pins(rest());
   pause(settings_.bits(1) / 2, rest());
@@ -254,7 +258,7 @@ void FtdiPort::send(std::size_t clocks, TransferResult* received) {
                                   std::to_string(replies_.size()) + " bytes within a second: unplug it and plug it in");
   }
   if (received == nullptr) return;
-  received->at = os::now();
+  received->at = end_ = os::now();
   received->late = std::max(received->at - before - duration, Time{});
 }
 
