@@ -124,10 +124,10 @@ class Failures(InterfaceCase):
     def test_read_reports_received_bytes_and_advice(self):
         for reply, error, found, advice in FRAMES:
             with self.subTest(reply), FakeInterface(reply) as interface:
-                result = absenc("read", f"e201:{interface.path}")
+                result = absenc("read", f"e201:{interface.path}?latency=300")
                 self.assert_failed(result, error, found, reply.hex(" ").upper())
                 self.assertIn(advice, result.stderr.partition("Try: ")[2])
-                trouble = json.loads(absenc("read", f"e201:{interface.path}", "--json").stdout)
+                trouble = json.loads(absenc("read", f"e201:{interface.path}?latency=300", "--json").stdout)
                 self.assertEqual((trouble["ok"], trouble["error"]), (False, error))
                 self.assertIn(found, trouble["message"])
                 self.assertIn(advice, trouble["advice"])
