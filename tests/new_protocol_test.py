@@ -89,7 +89,8 @@ class TestsOfEveryUnit(Copy):
     def linked(self, target):
         """Links a program of the build with the new library in place of its own."""
         command = run("ninja", "-C", BUILD, "-t", "commands", target).splitlines()[-1]
-        program = self.root.parent / Path(target).name
+        program = self.root.parent / target
+        program.parent.mkdir(exist_ok=True)
         command = command.replace(f" -o {target} ", f" -o {program} ").replace(" libabsenc.a", f" {self.library}")
         run("sh", "-c", command, cwd=BUILD)
         return program
@@ -123,6 +124,7 @@ class TestsOfEveryUnit(Copy):
 
     def test_tests_in_python(self):
         command = self.linked("bin/absenc")
+        (self.root.parent / "lib").symlink_to(BUILD / "lib")  # the programs and plug-ins that the command starts
         environment = {**os.environ, "ABSENC": str(command), "ABSENC_SOURCE_DIR": str(self.root)}
         self.assertIn("my_encoder", run(command, "list"))
         for name in LOOK_AT_EVERY_UNIT:

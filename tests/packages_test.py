@@ -17,7 +17,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = ("core", "link", "protocol", "host")
-VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+VERSION = (ROOT / "VERSION").read_text().strip()
 
 
 def run(*command, **settings):

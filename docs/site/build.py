@@ -114,7 +114,7 @@ def doxygen_of(headers, output, html, version):
 
 def main(build, output):
     build, output = Path(build).resolve(), Path(output).resolve()
-    version = re.search(r"^project\(absenc VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+    version = (ROOT / "VERSION").read_text().strip()
     shutil.rmtree(output, ignore_errors=True)
     html, source = output / "html", output / "source"
     source.mkdir(parents=True)

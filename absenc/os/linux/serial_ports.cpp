@@ -43,6 +43,8 @@ std::string program(const std::string& process) {
     std::string verb;
     std::getline(words, verb, '\0');
     if (std::getline(words, verb, '\0')) name += " " + verb;
+  } else if (name == "absenc-serve") {  // the program that the verb starts
+    name = "absenc serve";
   }
   return (name.empty() ? "a program" : name) + " (process " + process + ")";
 }
