@@ -149,7 +149,8 @@ TEST(Procedures, EndWithoutAValidReply) {
   ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request is sent once, and the second three times
   // The pause of 2 ms before the third attempt includes the 1 ms in which the host waited for the missing reply.
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
-  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
+  // After the last attempt the conversation ends 5 ms later, by Manner::hold of the request.
+  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);
 }
 
 TEST(Procedures, DamagedCharactersAreNoTimeout) {
@@ -169,7 +170,7 @@ TEST(Procedures, RepeatAfterDamageWhenTheLineIsSilent) {
 TEST(Procedures, RefusalEndsTheExchangeAtOnce) {
   Case<two_questions> refused([](std::uint8_t, unsigned) { return Wire{0xFF}; });
   EXPECT_EQ(refused.host.error(), Error::busy);
-  // After a refusal the engine does not wait for silence.
+  // After a reply that refuses the request, the engine does not wait for silence.
   EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);
 }
 

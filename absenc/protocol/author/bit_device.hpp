@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a clocked line whose data turns: the virtual encoder receives bits of the host, then drives its own.
+// Device side of a bidirectional clocked line: the virtual encoder receives bits of the host, then drives its own.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,8 @@
 
 namespace absenc::author {
 
-/// Rules for the direction of the data line. Each names both that drive it.
+/// Texts of the rules that the host must not drive the data line while the encoder drives it. Each text describes the
+/// breach of its rule.
 struct DirectionRules {
   /// The host sends more bits than its request has, while the encoder already drives its reply.
   std::string_view request;
@@ -31,9 +32,10 @@ class BitDevice : public EncoderOn<std::uint8_t> {
   void power_off(Time now) override;
 
  protected:
-  /// Bits of a request or of a supplement: enough for 16 bits of data behind command and address.
+  /// Bits of a request, or of a supplement, which the host sends behind the reply. There is room for 16 bits of data
+  /// behind command and address.
   using ReceivedBits = BitBuffer<96>;
-  /// Bits that the encoder drives: zeros while it is not ready, the reply, and what follows it.
+  /// Bits that the encoder drives: zeros until it is ready, the reply, and bits behind the reply, if any.
   using AnswerBits = BitBuffer<2048>;
 
   /// Constructs an encoder that is off. `start_time`: duration of its start-up. `rules` must outlive it.
@@ -42,17 +44,18 @@ class BitDevice : public EncoderOn<std::uint8_t> {
 
   /// Is called at the first falling edge of the clock. `period`: of the clock; 0: unknown.
   virtual void selected(Time at, Time period) = 0;
-  /// Returns the number of bits of the request that begins with `begin`, at least those of its command.
+  /// Returns the number of bits of the request that begins with `begin`, including those of its command. If `begin`
+  /// does not show this number, returns that of a command alone.
   [[nodiscard]] virtual std::size_t request_size(BitView begin) const = 0;
-  /// Puts the bits to drive behind the request into `bits`. `at`: the end of its last bit.
+  /// Puts the bits that the encoder drives behind `request` into `bits`. `at`: end of the last bit of `request`.
   virtual void respond(BitView request, Time at, AnswerBits& bits) = 0;
   /// Handles the bits that the host sends behind the reply.
   virtual void supplemented(BitView /*bits*/, Time /*at*/) {}
   /// Is called when the host has stopped the clock after `clocks` clocks.
   virtual void clocked(Time at, std::size_t clocks) = 0;
 
-  /// Sets how many of the driven bits the host reads: only these must not collide with bits of the host, and faults of
-  /// the line hit only them. Call it from `respond`.
+  /// Sets how many of the driven bits hosts read, counted from the first; by default all. Until these are over, a host
+  /// must not drive the line, and faults of the line change only these bits. Call it from `respond`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
   /// Returns the number of clocks from the first one to the end of the reply.
   [[nodiscard]] std::size_t reply_end() const { return driven_from_ + taken_; }

@@ -30,7 +30,7 @@ void BitEngine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep BitEngine::next(Time now) {
-  // A lambda, because the compiler would first fill a plain variable with zeros.
+  // The step is made by a lambda, because the compiler would first fill a plain variable with zeros.
   ByteStep step = []() -> ByteStep { return {.at = never}; }();
   // The traffic before this conversation is unknown, so pauses are measured from now.
   if (!started_) received_at_ = now;
@@ -79,7 +79,7 @@ void BitEngine::begin_transfer(ByteStep& step, Time now) {
     awaited_ = 0;
     state_ = State::added;
   } else {
-    awaited_ = 1;  // the encoder gets no supplement to a reply that is not understood
+    awaited_ = 1;  // after an invalid reply one clock follows instead of the supplement
     state_ = State::added;
   }
   if (step.goes_on && request_.rate != 0) {
@@ -99,7 +99,7 @@ void BitEngine::feed(const ByteEvent& event) {
   if (event.kind == Kind::sent && (state_ == State::clocking || state_ == State::added)) {
     received_at_ = event.at;
     if (size_ == 0 && awaited_ != 0) {
-      // Computed with 32 bits, because a processor without division is slow with 64.
+      // The period is computed with 32 bits, because a processor without division is slow with 64.
       const auto period = Time(request_.rate != 0 ? 1'000'000'000u / request_.rate : 0u);
       begun_at_ = event.at - period * static_cast<std::int64_t>(out_.size() + awaited_);
       sent_at_ = event.at - period * static_cast<std::int64_t>(awaited_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a clocked line whose data turns: the host sends bits, then clocks the reply out of the encoder.
+// Host side of a bidirectional clocked line: the host sends bits, then clocks the reply out of the encoder.
 #pragma once
 
 #include <cstddef>
@@ -19,18 +19,19 @@ using HostBits = BitBuffer<64>;
 struct BitRequest {
   HostBits bits{};        ///< Bits of the request, from the first clock on.
   HostBits supplement{};  ///< Bits that the host sends in the clocks behind a valid reply; empty: none.
-  /// Number of clocks behind the request. With a supplement: as few as a complete reply can need; the host then clocks
-  /// on until the reply is complete.
+  /// Number of clocks behind the request. If a supplement follows: the number for the shortest complete reply; the host
+  /// then adds clocks until the reply is complete.
   std::size_t clocks = 0;
-  std::size_t late_clocks = 0;  ///< With a supplement: most clocks by which the reply is expected to be later.
-  std::uint32_t rate = 0;       ///< Rate of the clock in Hz.
-  Time rest{};                  ///< Shortest time from the last exchange to this one.
+  /// If a supplement follows: greatest number of clocks that a reply is expected to need beyond `clocks`.
+  std::size_t late_clocks = 0;
+  std::uint32_t rate = 0;  ///< Rate of the clock in Hz.
+  Time rest{};             ///< Shortest time from the last exchange to this one.
 
   /// Returns whether there are no bits to send: the request has no encoding.
   [[nodiscard]] constexpr bool empty() const { return bits.size() == 0; }
 };
 
-/// Conversation on a clocked line whose data turns; a subclass provides the protocol.
+/// Conversation on a bidirectional clocked line; a subclass provides the protocol.
 ///
 ///   | state    | next step                                       | continues with        |
 ///   |----------|-------------------------------------------------|-----------------------|
@@ -54,7 +55,8 @@ class BitEngine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
+  /// Puts no fields of a result; the subclass Reported (command.hpp) puts them, so that a program without it links no
+  /// names and texts of fields.
   void report(FieldSink&) const override {}
   /// Returns the bits of the last request with its supplement, and those of the reply, as bytes.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
@@ -77,8 +79,8 @@ class BitEngine : public Conversation<std::uint8_t> {
   explicit BitEngine(MutableBytes storage) : storage_(storage) {}
   ~BitEngine() = default;
 
-  /// Sets that `request` is sent next, not before `earliest`. Of `manner` repetitions, their pause, `holds_line` and
-  /// `expects_reply` hold.
+  /// Sets that `request` is sent next, not before `earliest`. The engine uses only the members `repeats`, `pause`
+  /// and `holds_line` of `manner`.
   void send(const BitRequest& request, const Manner& manner, Time earliest);
   /// Sets that the caller gets the present result, by the step `emit`.
   void emit() { emitting_ = true; }
@@ -111,14 +113,14 @@ class BitEngine : public Conversation<std::uint8_t> {
   bool started_ = false;
   bool emitting_ = false;
   Error error_ = Error::none;
-  Error reply_error_ = Error::none;  // error of the reply before the supplement
+  Error reply_error_ = Error::none;  // error of the reply, found before the supplement is sent
   std::size_t size_ = 0;             // number of bits of the reply
-  std::size_t awaited_ = 0;          // number of bits that the present transfer delivers
+  std::size_t awaited_ = 0;          // number of bits that the host receives in the present transfer
   MutableBytes storage_;
   Manner manner_{};
   BitRequest request_{};
-  HostBits sent_bits_{};  // request, and the supplement if it was sent
-  HostBits out_{};        // bits of the present transfer
+  HostBits sent_bits_{};  // bits of the request, and of the supplement if it was sent
+  HostBits out_{};        // bits that the host sends in the present transfer
   Time earliest_{};
   Time begun_at_{};
   Time sent_at_{};

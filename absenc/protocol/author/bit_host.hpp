@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines the engine of a clocked line whose data turns with a protocol.
+// Combines the engine of a bidirectional clocked line with a protocol.
 #pragma once
 
 #include <array>
@@ -70,7 +70,7 @@ class HostOf<P> : public BitEngine {
     reading.received = received_at();
     return reading;
   }
-  /// Returns false: the explanation of a reply is added to the error's texts.
+  /// Returns false: the unit's explanation of the last reply is always added to the texts of an error.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:

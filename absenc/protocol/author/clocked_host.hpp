@@ -19,8 +19,8 @@ namespace absenc::author {
 ///     using Request = NoRequest;
 ///     static constexpr unsigned most_clocks;                 // of one transfer
 ///     static ClockedHostTimes host_times(const Format&);
-///     static unsigned clocks(const Format&);                 // of one reading; refused if they need more bytes
-///                                                            // than `most_clocks`
+///     static unsigned clocks(const Format&);                 // of one reading; error invalid_argument if it
+///                                                            // takes more bytes than `most_clocks` bits
 ///     static Result<Reply> decode(const Format&, BitView);
 ///     static Reading reading(const Format&, const Reply&);
 ///   };

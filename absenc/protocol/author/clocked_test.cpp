@@ -163,7 +163,7 @@ TEST(ClockedDevice, DrivesOnceForEachSelectionWhileItIsOn) {
   EXPECT_FALSE(device.next(1ms).kind == ByteStep::Kind::transfer);
   EXPECT_EQ(clocked(2ms, 0), 0u);
   EXPECT_EQ(clocked(2ms, 8), 1u);
-  EXPECT_EQ(clocked(2ms, 8), 1u);  // a further `sent` event after one selection is ignored
+  EXPECT_EQ(clocked(2ms, 8), 1u);  // a second `sent` event for the same transfer is ignored
   EXPECT_TRUE(select(3ms));
   device.power_off(3ms);
   EXPECT_EQ(clocked(4ms, 8), 1u);

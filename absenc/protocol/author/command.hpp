@@ -306,7 +306,7 @@ template <const auto& unit_report, auto request, class Reader = ReadPosition<Rep
           .size = sizeof(Made)};
 }
 
-/// Returns the declaration of a command that a procedure executes. `finding` reports its result.
+/// Returns the declaration of a command that a procedure executes. `finding` (a Finding) reports its result.
 template <const auto& unit_report, const auto& finding, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> command(const Command& info) {
   using P = ReportedProtocol<unit_report>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversation that reads a position where a single reply may not prove that it is right.
+// Conversation that reads a position a second time if the first reply does not prove that the position is right.
 #pragma once
 
 #include <optional>

@@ -61,11 +61,13 @@ struct Declaration {
   /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins with these bytes. Null:
   /// every reply is assumed to have the length P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error to report for the reply to an invalid request. Null: `error`, the request's own error.
+  /// Returns the error to report for the reply to an invalid request; `error` is that of the request. Null: `error` is
+  /// reported.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
   /// Checks a frame and puts its fields into the sink. Null: the functions of P check it, and `report` puts the fields.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
-  /// For clocked links with `control_bit`: checks the exchanged bits and puts their fields.
+  /// For clocked links with `control_bit`: checks a request and its reply of which each frame carries one bit, and puts
+  /// their fields into the sink.
   Error (*decode_control)(Frame request, Frame reply, FieldSink&) = nullptr;
 
   /// For clocked links: writes the host's bits of a command into `out`, as text of 0 and 1, and returns their number.
@@ -90,10 +92,11 @@ struct Declaration {
   bool (*streams)(const Options&) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs; null: none.
   ExtraWires (*extra_wires)(const Options&) = nullptr;
-  /// For clocked links: returns the index of the bit of a reply that answers the level of the clock line in the pause;
-  /// null: no reply has one.
+  /// For clocked links on which the host sends a bit by the level of the clock line in each pause: returns the index of
+  /// the bit of a reply that answers the host's bit; null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
-  /// For bidirectional clocked links: returns the ranges of bits of this burst that the host sends, in their order.
+  /// For bidirectional clocked links: returns the ranges of bits that the host sends, in their order. `burst`: the bits
+  /// of all clocks between two pauses of the clock.
   BitRanges (*host_bits)(const Options&, Frame burst) = nullptr;
   /// Returns the alarms that an encoder with these options can report; null: it can report all.
   std::uint32_t (*reportable)(const Options&) = nullptr;

@@ -11,7 +11,8 @@ constexpr std::string_view turn_rule = "request during the encoder's transmissio
 // Shortest time that a host is assumed to wait for a reply, because a pseudo-terminal alone may delay a reply by this
 // time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
-// Greatest number of consecutive replies during which a request is no rule breach because this program may be late.
+// Greatest number of consecutive replies during which a request of the host is no rule breach, because this program may
+// have sent the reply too late.
 constexpr unsigned most_excuses = 2;
 }  // namespace
 

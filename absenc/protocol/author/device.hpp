@@ -78,7 +78,7 @@ class Responder : public EncoderOn<std::uint8_t> {
     longer_ = delay;
     turns_ = all;
   }
-  /// Handles the end of a transmission.
+  /// Handles the end of a transmission of this encoder.
   virtual void replied(Time) {}
   /// Answers `request`, received at `at`: writes the reply, and returns how it is answered.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
@@ -160,7 +160,8 @@ class BusDevice : public Responder {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns position and motion of the shaft at the time `at`.
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
-  /// Returns the position of the shaft at `at` in counts of 2^-bits revolution from the zero at `zero_address`.
+  /// Returns the position of the shaft at `at`, in counts of 2^-bits revolution, from the zero that the memory has at
+  /// `zero_address`.
   [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
     const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
     return (shaft(at).position - zero) >> (32 - bits);

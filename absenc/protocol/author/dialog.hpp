@@ -96,7 +96,7 @@ class HostOf : public Engine {
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
-  /// Reads from an encoder of this format with `request`.
+  /// Constructs a conversation that reads from an encoder of this format with `request`.
   ReadPosition(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }
@@ -356,7 +356,7 @@ class Run : public ProcedureDialog<P> {
   }
   /// Returns the result of the procedure, as far as it has been stored.
   [[nodiscard]] const Found& found() const { return found_; }
-  /// Returns the counts of a procedure that streams; null: it ends by itself.
+  /// Returns the counts of discarded frames, all zero, if the procedure streams; null if it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
   /// Returns whether the procedure streams, with a request for each result: `Found` then has a member `streams`.
   [[nodiscard]] bool asks() const final { return goes_on; }
@@ -373,7 +373,8 @@ class Run : public ProcedureDialog<P> {
  private:
   static constexpr bool goes_on = requires { Found::streams; };
 
-  static constexpr StreamCounts counts_{};  // all zero: a procedure that polls the encoder discards no frames
+  // All counts are zero: the procedure sends a request for each result, so it discards no frames.
+  static constexpr StreamCounts counts_{};
 
   Found found_{};
   Buffer<std::int64_t, 6> arguments_;

@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// A virtual encoder with power, alarms, rule checks and counters. Subclasses add the line.
+/// A virtual encoder with power, alarms, rule checks and counters. Subclasses receive and send on a line.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
@@ -31,7 +31,7 @@ class EncoderOn : public Device<Item> {
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
   /// Returns a number that the encoder increments with every change that it makes to the memory.
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
-  /// Returns the first rule breaches of the host, in order of time.
+  /// Returns the rule breaches of the host in order of time, as far as there is room; later ones are only counted.
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
   /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }

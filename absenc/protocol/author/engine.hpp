@@ -65,7 +65,8 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
+  /// Puts no fields of a result; the subclass Reported (command.hpp) puts them, so that a program without it links no
+  /// names and texts of fields.
   void report(FieldSink&) const override {}
   /// Returns the last request, which is empty after `listen`, and the bytes received since then, as `reply` returns
   /// them.
@@ -161,7 +162,7 @@ class Engine : public Conversation<std::uint8_t> {
   bool emitting_ = false;
   Error error_ = Error::none;
   std::size_t size_ = 0;
-  std::size_t due_ = 0;  // bytes of the reply still to be received
+  std::size_t due_ = 0;  // number of bytes of the reply still to be received
   MutableBytes storage_;
   HostTimes times_;
   // An item received at this time or later shows that the line is never silent.

@@ -88,7 +88,8 @@ template <auto member>
   return one;
 }
 
-/// Returns the option `one`, marked as one that a word format replaces.
+/// Returns the option `one`, marked as one that describes the position word; a word format that the user gives replaces
+/// it.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> describing_word(OptionOf<member> one) {
   one.info.describes_word = true;

@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// Result of `scan`: the addresses at which something answered, and clashes.
+/// Result of `scan`: the addresses at which something answered, and those that two encoders may share.
 template <std::size_t addresses>
 struct Nodes {
   /// For each address: whether an encoder answered, with a valid reply or with two invalid ones.

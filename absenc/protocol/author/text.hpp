@@ -27,13 +27,13 @@ struct VectorText {
   std::string_view fields;
 };
 
-/// Is never defined: a call at compile time is an error that names this function.
+/// Has no definition. A wrong text of a vector or model calls this function, and the compile error shows its name.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
-/// Is never defined: a call at compile time is an error that names this function.
+/// Has no definition. A wrong text of a vector or model calls this function, and the compile error shows its name.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
-/// Is never defined: a call at compile time is an error that names this function.
+/// Has no definition. A wrong text of a vector or model calls this function, and the compile error shows its name.
 void open_bytes_of_a_frame_are_not_consecutive();
-/// Is never defined: a call at compile time is an error that names this function.
+/// Has no definition. A wrong text of a vector or model calls this function, and the compile error shows its name.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
 /// Calls `take(name, value)` for each "name=value" of `text`, until a call returns false. Returns true if no call

@@ -51,7 +51,7 @@ struct Descriptor {
   /// Whether hosts send requests that functions of P decode. False on clocked lines, and if the declaration has a
   /// `decode` of its own.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
-  /// Whether frames are bits.
+  /// Whether frames of the protocol are bits, not bytes or CAN frames.
   static constexpr bool has_bits = Clocked<P> || Bitwise<P>;
 
   // ---- Functions of the descriptor
@@ -339,7 +339,8 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether a vector decodes to what it expects; of a vector with open bytes only the options are checked.
+  /// Returns whether decoding a vector gives the fields or error that it states. If the vector leaves bytes open,
+  /// only its options are checked.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);

@@ -214,7 +214,7 @@ struct UnitBench {
     line.converse(conversation);
     line.on_emit = {};
   }
-  /// Sends these bytes at once, and returns the host with the bytes that it received.
+  /// Sends these bytes in one transfer, and returns the host with the bytes that it received.
   sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {
     sim::testing::RawHost host(std::move(request), answer, gap, line.now());
     line.converse(host);
