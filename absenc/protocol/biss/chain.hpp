@@ -24,7 +24,8 @@ struct ChainFormat {
   StopBit stop_bit = StopBit::next;
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  /// Longest time until the positions are ready, with the line's delay; the number of clocks depends on it.
+  /// Longest time from the second rising edge of MA until the positions are ready, including the delay of the
+  /// line; the number of clocks depends on it.
   Time latency = 10us;
   Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;  ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
@@ -36,7 +37,8 @@ struct ChainFormat {
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
-/// Returns whether count and slave are valid, and each word has a position and a usable check.
+/// Returns whether the numbers of encoders and of the selected slave are valid, and each word has a position and a
+/// check that `is_usable` accepts.
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {

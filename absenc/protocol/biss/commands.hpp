@@ -228,7 +228,8 @@ Result<std::size_t> encode_control(const F& format, const Command& command, Argu
 /// Returns the line settings of BiSS, which are the same for all formats.
 template <class F>
 constexpr LineSettings line_of(const F&) {
-  return line_settings;  // these settings have no rate of a format, because the conversation sets the clock rate itself
+  // The rate in `line_settings` is not that of the format, because the conversation sets the clock rate itself.
+  return line_settings;
 }
 
 /// Decodes a control frame into `sink`: `asked` has its CDM bits, `answered` its CDS bits.

@@ -53,7 +53,8 @@ bool ControlMaster::next(bool cds) {
 }
 
 void ControlMaster::fail(Error error) {
-  zeros_ = 0;  // Slaves that missed this position frame begin to count zeros with the next frame.
+  // Slaves that missed this position frame begin to count the zeros of CDM with the next frame, so the host does too.
+  zeros_ = 0;
   end(error);
 }
 
@@ -251,7 +252,8 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// Begins a byte, or waits if the target is not ready. The first written byte must not wait.
+// Begins a data byte, or awaits another start bit if the register of `target` is not ready. The first written byte
+// must not be delayed.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;

@@ -35,8 +35,8 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; a character that cannot be printed is shown as `\x` and two hexadecimal
-/// digits.
+/// The two characters of a manufacturer as text; a character that cannot be printed is shown as `\x` and two
+/// hexadecimal digits.
 class MakerName {
  public:
   /// Appends `bytes`, which are values of the manufacturer registers.
@@ -87,11 +87,11 @@ struct ControlResults {
   /// True: the encoder refused to read the register; otherwise no value.
   std::optional<bool> missing{};
   std::optional<std::uint8_t> eds_bank{};        ///< Bank of the electronic data sheet; 0: the encoder has none.
-  std::optional<std::uint16_t> profile{};        ///< Profile of the encoder.
+  std::optional<std::uint16_t> profile{};        ///< Number of the BiSS profile that the encoder has.
   std::optional<std::uint64_t> serial_number{};  ///< Serial number of the encoder.
   ByteBuffer<6> device_id;                       ///< Device ID of the encoder, six bytes; empty if it was not read.
   MakerName manufacturer;                        ///< Manufacturer's two characters; empty if they were not read.
-  /// Position of the encoder; stays empty, because these procedures do not report one.
+  /// Position of the encoder; always empty, because results of control frames have no position.
   Reading reading{};
 };
 

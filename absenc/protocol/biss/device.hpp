@@ -47,7 +47,7 @@ class EncoderOf {
   /// Fills `samples` with SLO for a frame whose first falling edge of MA is at `at`.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
-    // If half a period is as long as the timeout or longer, the frame ends at once and SLO is idle.
+    // If half a period of MA is as long as the BiSS timeout or longer, the frame ends at once and SLO is idle.
     if (period / 2 >= format_.timeout.of_encoder(period)) {
       samples.append(~std::uint64_t{0}, 64);
       return;
@@ -207,7 +207,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       count_answer();
     }
     clocked_before_ = true;
-    free_at_ = at - period_ / 2 + timeout_;  // the BiSS timeout begins at the last rising edge
+    free_at_ = at - period_ / 2 + timeout_;  // the BiSS timeout begins at the last rising edge of MA
   }
   void started(Time) override {
     registers_.power_on();

@@ -93,7 +93,7 @@ TEST(BissDevice, ReadyTimeIsThatOfOptionsOrAtMostTenMicroseconds) {
   EXPECT_EQ(ack(4us, 7us), 7u);
 }
 
-/// Returns how many of 100 frames are received unchanged.
+/// Returns how many of 100 frames the host receives unchanged with this delay of the line and this period of MA.
 unsigned good_frames(Time line_delay, Time period) {
   testing::TestShaft shaft;
   shaft.state.position = 0x1234'5678'9ABC;

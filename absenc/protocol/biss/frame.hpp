@@ -96,7 +96,8 @@ struct Format {
   /// Virtual encoder: whether SLO stays idle after power on until the start sequence.
   bool start_sequence = false;
   Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
-  /// Longest time until the position is ready, with the delay of the line; up to 1 ms.
+  /// Longest time from the second rising edge of MA until the position is ready, including the delay of the line; up
+  /// to 1 ms.
   Time latency = 10us;
   // ---- Members for the virtual encoder
   /// How the virtual encoder sets the bit P after each register (1: the next register is refused).
@@ -232,7 +233,8 @@ struct Head {
   [[nodiscard]] constexpr unsigned delay_bits() const { return idle > idle_bits ? idle - idle_bits : 0; }
 };
 
-// Finds where the `size` bits of data begin. Returns false for a frame that only the slow decoder can decode.
+// Finds where the `size` bits of data begin. Returns false for a frame that `decode_compiled` cannot decode: it is cut
+// off, its bits before the data do not fit into one register, or its CDS is 1 where it must be 0.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -247,7 +249,8 @@ struct Head {
   return !head.cds || cds == Cds::any;
 }
 
-// Decodes a usual frame without errors fast; calls `otherwise` for any other frame.
+// Decodes a frame that has no error and whose bits before the data fit into one register; calls `otherwise` for any
+// other frame.
 template <class Values, class Channel, class Otherwise>
 [[nodiscard, gnu::always_inline]] constexpr Result<ReplyWith<Values>> decode_compiled(const Channel& channel,
                                                                                       const BitView& samples, Cds cds,
@@ -309,7 +312,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// Decodes a frame whose format is known at compile time; the errors are those of a format known at run time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
-  // For processors without registers of 64 bits only one of the two decoders is compiled, to save memory.
+  // To save memory, a program for a processor without registers of 64 bits has only `decode_by`.
   if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
     return detail::decode_compiled<typename Known<format>::Word>(
         detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });
@@ -343,8 +346,9 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
 template <const Format& known>
 struct KnownFormat {
   static constexpr std::uint16_t ma_khz = known.ma_khz;  ///< Clock MA in kHz.
-  static constexpr Time latency = known.latency;         ///< Longest time until a position is ready, line included.
-  static constexpr Timeout timeout = known.timeout;      ///< BiSS timeout after the last clock.
+  /// Longest time from the second rising edge of MA until a position is ready, including the delay of the line.
+  static constexpr Time latency = known.latency;
+  static constexpr Timeout timeout = known.timeout;  ///< BiSS timeout after the last clock.
   /// Returns the period of MA.
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };

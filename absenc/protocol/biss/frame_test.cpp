@@ -94,7 +94,8 @@ void agree(std::uint64_t seed) {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // Skipped bits are not stored, so with such bits the encoded frame is not compared.
+    // A decoded reply does not have the bits that the word format skips, so with such a format the frame that is
+    // encoded again is not compared.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;

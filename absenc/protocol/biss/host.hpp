@@ -11,7 +11,8 @@
 
 namespace absenc::biss {
 
-/// Upper limit of the extra delay of encoder and line that a host searches.
+/// Greatest time by which the delay of encoder and line may exceed the format's `latency` so that a host still finds
+/// the start bit.
 inline constexpr Time longest_delay = 80us;
 
 /// A conversation that reads positions and carries control frames; dialog.hpp defines it.
@@ -44,9 +45,10 @@ struct ProtocolOf {
   static constexpr author::ClockedHostTimes host_times(const F& format) {
     return {std::uint32_t{format.ma_khz} * 1000, format.timeout.of_host(format.period())};
   }
-  /// Returns the number of clocks of a frame with the expected delay.
+  /// Returns the number of clocks of a frame whose delay of encoder and line is the format's `latency`.
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
-  /// Returns the number of clocks with the longest delay that is searched, at most `most_clocks`.
+  /// Returns the number of clocks, at most `most_clocks`, of a frame whose delay of encoder and line is longer than the
+  /// format's `latency` by `longest_delay`.
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }

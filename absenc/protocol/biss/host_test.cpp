@@ -279,7 +279,7 @@ TEST(BissHost, ExplainsErrors) {
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);
   EXPECT_NE(found(Error::invalid_argument, 1'000'000).find("lower latency_us"), std::string_view::npos);
-  // invalid_argument has no explanation if a frame has few clocks, because the word format is then invalid.
+  // If a frame has at most 512 clocks, invalid_argument has no explanation, because then the word format is invalid.
   EXPECT_EQ(found(Error::invalid_argument, 10'000), "");
   EXPECT_EQ(found(Error::line_stuck, 10'000), "");
 }

@@ -41,7 +41,8 @@ struct SafetyFormat {
   std::int8_t previous_life_counter = -1;  ///< Life counter of the previous frame; -1: unknown.
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  /// Longest time until the position is ready, with the line's delay; the number of clocks depends on it.
+  /// Longest time from the second rising edge of MA until the position is ready, including the delay of the
+  /// line; the number of clocks depends on it.
   Time latency = 10us;
   Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;      ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
@@ -93,7 +94,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
 
 }  // namespace detail
 
-/// Returns whether both polynomials and `compare_bits` are usable.
+/// Returns whether `is_usable` accepts the checks of both words, and `compare_bits` is 1 to the number of position bits
+/// of each word.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
   if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
