@@ -19,7 +19,7 @@ inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, Muta
   if (size > 1) request[1] = checksum8(profile.crc_bit_order, Bytes(request).first(1));
   return size;
 }
-// Writes a position request that has only a wrong parity bit, and returns its length in bytes.
+// Writes a position request whose only error is a wrong parity bit, and returns its length in bytes.
 inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   const std::uint8_t good = control_field(profile, profile.address, DataId::position);

@@ -293,7 +293,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
     return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
   }
-  // Returns the turns of the shaft since the zero of channel 1, so that they change where its position wraps.
+  // Returns the turns of the shaft, counted from the zero of channel 1, so that the turns change where the position of
+  // channel 1 wraps.
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }

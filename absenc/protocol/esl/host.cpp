@@ -141,8 +141,8 @@ constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// Sends a memory request until the memory is not busy. `after_busy`: a byte counts only after a busy reply, because
-// without one it may be a byte that another host requested.
+// Repeats a memory request while the memory is busy. `after_busy`: the byte in a reply is accepted only after at least
+// one busy reply, because otherwise it may be a byte that another host requested.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,

@@ -89,8 +89,8 @@ struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // The lowest rank is for `request_not_accepted`: under such a profile the encoder would not have answered the
-  // request.
+  // Returns the rank of the failed check: of two profiles that fail at the same capture, the one with the higher rank
+  // is better. The lowest rank is for `request_not_accepted`, because the encoder would not have answered the request.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -108,7 +108,7 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: the progress of that profile with this value which explains the most captures.
+// For each value of an option: how far the captures agree with the best of all profiles that have this value.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
@@ -169,7 +169,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  // Each value of each option begins with the least progress that a profile can have.
+  // Each value of each option begins with the worst Progress: the first capture fails the check of the lowest rank.
   for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);

@@ -19,7 +19,7 @@ namespace absenc::esl {
 /// The first check that a reply failed; `passed` if it failed none.
 enum class Check : std::uint8_t {
   passed,
-  // The next checks are made for every reply.
+  // Checks that are made for every reply.
   length,
   channel_2_missing,
   ch1_checksum,
@@ -41,7 +41,7 @@ enum class Check : std::uint8_t {
   sequences_differ,
   redundant_position,
   encoder_ids_differ,
-  // The next checks are made for a safe position only.
+  // Checks that are made for a safe position only.
   not_a_safety_reply,
   ch1_not_ready,
   ch2_not_ready,
@@ -51,7 +51,7 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // Only `probe` (probe.hpp) reports the next check.
+  // Check that only `probe` (probe.hpp) reports: whether an encoder accepts the request.
   request_not_accepted,
 };
 

@@ -60,9 +60,9 @@ inline constexpr std::uint8_t error_info_lissajous = 0x08;
 
 /// Permitted numbers of writes (notes 6 and 7 of Table 11); 0: no limit.
 namespace life {
-inline constexpr std::uint32_t eeprom = 1'000'000;  ///< permitted writes of the EEPROM
-inline constexpr std::uint32_t mtp = 100'000;       ///< permitted writes of the MTP memory
-inline constexpr std::uint32_t registers = 0;       ///< permitted writes of a register: no limit
+inline constexpr std::uint32_t eeprom = 1'000'000;  ///< permitted number of writes of the EEPROM
+inline constexpr std::uint32_t mtp = 100'000;       ///< permitted number of writes of the MTP memory
+inline constexpr std::uint32_t registers = 0;       ///< permitted number of writes of a register: no limit
 }  // namespace life
 
 /// Areas of the memory as in Table 11; pages 1 to 3 of the user area are assumed to exist.
