@@ -101,7 +101,7 @@ struct Format {
   OffsetUnit offset_unit = OffsetUnit::counts;  ///< Unit of the position offset: counts or a fraction of a turn.
   /// Frames per second that the encoder sends without requests; 0: it answers requests.
   std::uint32_t stream_rate = 0;
-  Generation generation = Generation::aksim2;  ///< Generation of the virtual encoder.
+  Generation generation = Generation::aksim2;  ///< Whether the virtual encoder is an AksIM-2 or an AksIM-4.
   /// Number of bytes of the identity that the virtual encoder sends on a UART, 19 or 20.
   std::uint8_t identity_size = identity_bytes;
 

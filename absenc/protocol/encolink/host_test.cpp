@@ -434,7 +434,8 @@ TEST(EncolinkListen, HasNoReadingAfterStreamEnds) {
   for (int i = 0; i < 3; ++i) {
     listen.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1ms, .items = frame});
   }
-  for (int i = 0; i < 2; ++i) {  // the host does not emit the first of the three frames, which only gives alignment
+  // The host does not emit the first of the three frames: the frame only shows it where frames begin.
+  for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(listen.next(1ms).kind, Kind::emit);
     EXPECT_NE(listen.reading(), nullptr);
   }

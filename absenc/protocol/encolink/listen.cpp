@@ -23,7 +23,8 @@ void Listen::end(Error error, std::string_view detail) {
 
 ByteStep Listen::next(Time now) {
   if (!done_ && find()) {
-    // the timeout restarts at the next call, so that the time in which the caller processes the frame does not count
+    // The next call of this function starts the timeout again, so that it does not include the time in which the caller
+    // processes the frame.
     deadline_ = Time{};
     return {.kind = ByteStep::Kind::emit};
   }
@@ -63,7 +64,8 @@ void Listen::feed(const ByteEvent& event) {
   counts_.discarded = discarded_.count();
 }
 
-// Finds the next valid frame or the loss of alignment. Returns false if the received bytes contain neither.
+// Finds the next valid frame, or a fault after which the host does not know where frames begin. Returns false if the
+// received bytes contain neither.
 bool Listen::find() {
   if (std::exchange(disturbed_, false)) {
     lose(Error::bad_framing, {});
@@ -75,7 +77,7 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      // At alignment the first of two frames is dropped, because the time at which it began is unknown.
+      // Two valid frames in a row show where frames begin. The first is dropped, because it is unknown when it began.
       if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
       const Bytes frame = waiting().first(size);

@@ -48,7 +48,8 @@ class Listen final : public Conversation<std::uint8_t> {
   DiscardedFrames discarded_;
   StreamCounts counts_{};
   bool in_step_ = false;
-  bool disturbed_ = false;          // whether a damaged character was received while aligned
+  // whether a damaged character was received while the host knew where frames begin
+  bool disturbed_ = false;
   bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;

@@ -31,7 +31,8 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// Requests one frame and returns its error. After an invalid frame, channel 2 is no longer aligned.
+// Requests one frame and returns its error. After an invalid frame the host no longer knows which byte of its cycle the
+// next channel 2 byte is.
 Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -75,7 +76,8 @@ Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   co_return identity;
 }
 
-// Reads the next valid frame. The request is `ask` if channel 2 is not aligned, otherwise a position request.
+// Reads the next valid frame. If the host does not know where cycles of channel 2 begin, the request is `ask`,
+// otherwise a position request.
 Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {

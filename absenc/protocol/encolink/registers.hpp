@@ -67,7 +67,7 @@ enum class AccessStatus : std::uint8_t {
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
 /// How the bytes of a register are decoded. All numbers are big endian.
-// celsius and rpm are signed numbers in tenths
+// Values of the kinds celsius and rpm are signed, in tenths of 1 degC and of 1 rpm.
 enum class Content : std::uint8_t { number, celsius, rpm, flags, text };
 
 /// Description of a register of the encoder: a row of the table `registers`.
