@@ -83,7 +83,7 @@ inline constexpr std::uint8_t temperature_channel = 0x48;
 inline constexpr std::size_t field_capacity = 128;  ///< Greatest size of a data field in bytes.
 /// Size in bytes of a memory block; sizes of data fields and of the memory are multiples of it.
 inline constexpr std::size_t block_size = 16;
-/// Number of data fields that hosts can access, beside the description: 0 to 13.
+/// Number of data fields that hosts can access. They have the numbers 0 to 13; the description is not one of them.
 inline constexpr std::uint8_t user_fields = 14;
 /// Number of the data field with the description: the resolution and the range of the encoder.
 inline constexpr std::uint8_t description_field = 0xFF;
@@ -336,8 +336,8 @@ struct Format {
   }
   /// Returns the type that the virtual encoder has in its type label.
   [[nodiscard]] constexpr std::uint8_t type_in_label() const { return type != 0 ? type : type_with(resolution()); }
-  /// Returns whether `bits`, the resolution that an encoder reports, contradicts the options; 0 and 0, no report,
-  /// contradicts nothing.
+  /// Returns whether `bits`, the resolution that an encoder reports, contradicts the options. If the encoder reports
+  /// none, which is 0 and 0, nothing is contradicted.
   [[nodiscard]] constexpr bool contradicts(const Resolution& bits) const {
     const bool is_other_turn = singleturn_bits != 0 && singleturn_bits != bits.singleturn_bits;
     const bool are_other_turns = multiturn_bits >= 0 && static_cast<unsigned>(multiturn_bits) != bits.multiturn_bits;

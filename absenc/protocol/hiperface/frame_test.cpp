@@ -243,7 +243,7 @@ TEST(HiperfaceFrame, RefusesFramesOfNoEncoder) {
   EXPECT_EQ(error_of({0x40, 0x45}), Error::unexpected_reply);
   EXPECT_EQ(error_of({0x40, 0x4A, 0, 0, 129, 0x55}), Error::out_of_range);
   EXPECT_EQ(decode_reply(format, position_request, {}).error(), Error::timeout);
-  // The next checks are for a captured reply without its request.
+  // From here on the test uses a captured reply without its request.
   const auto alone = [&](Wire bytes) {
     bytes.push_back(checksum(bytes));
     return unit.check(author::testing::options_of(unit, ""), {}, {.bytes = bytes});

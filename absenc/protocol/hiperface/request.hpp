@@ -209,7 +209,7 @@ constexpr void append_frame(RequestBytes& bytes, const Request& request) {
 /// `bytes` must have at least 3 bytes.
 [[nodiscard]] constexpr std::optional<Request> decode_joined(Bytes bytes) {
   const Request request{.address = bytes[0], .statuses = static_cast<std::uint8_t>(bytes.size() / shortest_frame - 1)};
-  // one more than there are alarms, because the last status may repeat a code
+  // The limit is one more than the number of alarms, because the last status may repeat a code.
   if (request.statuses > alarms.size() + 1) return {};
   const RequestBytes joined = encode_request(request);
   if (!std::equal(bytes.begin(), bytes.end(), joined.view().begin(), joined.view().end())) return {};
