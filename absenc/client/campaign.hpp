@@ -46,8 +46,8 @@ struct CampaignChoices {
 struct CheckWorth {
   unsigned check_bits = 0;     ///< Width of the checksum in bits; 0: frames have no checksum.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
-  /// Hamming distance of the checksum: every error of fewer wrong bits, all of them covered by it, is detected; 0:
-  /// above 8.
+  /// Hamming distance of the checksum: the checksum detects every error of fewer wrong bits, if it covers all of these
+  /// bits; 0: the distance is above 8.
   unsigned distance = 0;
   double words = 0;  ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
   /// Share of all replies with wrong bits only among those that the checksum covers, and yet with a correct checksum.
@@ -60,8 +60,8 @@ struct CheckWorth {
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
-  /// Share of confirmed readings with a position that the shaft did not have near that time. Readings of an encoder
-  /// that a fault has changed are left out.
+  /// Share of confirmed readings with a position that the shaft did not have within 2 ms of the reading's latch time.
+  /// Readings of an encoder that a fault has changed are left out.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   /// Computed number of wrong positions that pass the frame checks and are then confirmed by a second reading.

@@ -122,7 +122,8 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
     if (option.name != command.changes_option) continue;
     for (std::size_t i = 0; i < option.choices.size(); ++i) {
       candidates.push_back(candidates.front());
-      // The argument is the choice if that is a number, else its index.
+      // The first argument of the command selects a choice of the option: it is the choice itself if that is a number,
+      // else the index of the choice.
       candidates.back().front() = parse_number(option.choices[i]).value_or(static_cast<std::int64_t>(i));
     }
   }

@@ -34,8 +34,8 @@ struct RuleCount {
 struct RequestCounts {
   /// Number of good requests; those for other encoders on the line may count, too.
   std::uint64_t good = 0;
-  /// Number of byte runs, CAN frames and characters with a line error that are no good request. The count starts again
-  /// at the first good request.
+  /// Number of received items that are no good request. Items are CAN frames, characters with a line error, and series
+  /// of bytes without a pause. The count starts again at the first good request.
   std::uint64_t bad = 0;
   /// Number of bad requests before the first good request; 0 until there is a good one.
   std::uint64_t before = 0;
@@ -73,7 +73,8 @@ class Emulation {
   void raise_alarm(std::string_view name);
   /// Ends the cause of an alarm; an alarm that the encoder latches stays. Throws UsageError.
   void lower_alarm(std::string_view name);
-  /// Sets a condition, as "temperature", to a value in the condition's unit. Throws UsageError.
+  /// Sets a condition to a value in its unit of measure (Condition::unit), as "temperature" to 85 degC. Throws
+  /// UsageError.
   void set_condition(std::string_view name, std::int64_t value);
   /// Sets the rate, 0 to 1, of a fault such as "corrupt". Throws UsageError.
   void set_fault(std::string_view kind, double rate);

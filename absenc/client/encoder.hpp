@@ -61,9 +61,9 @@ struct Sample {
   std::int64_t position = 0;
   /// Whether `position` starts again at this sample, after a jump or after too long a pause.
   bool restarted = false;
-  /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
+  /// Whether `speed` is valid: the latch times of this position and an earlier one must determine it closely enough.
   bool speed_valid = false;
-  /// Mean speed between two positions, in rpm (mm/s for linear encoders); 0 unless `speed_valid`.
+  /// Mean speed from an earlier position to this one, in rpm (mm/s for linear encoders); 0 unless `speed_valid`.
   double speed = 0;
   /// Greatest difference between `speed` and the true mean speed, in the same unit; errors of the encoder are not
   /// included.

@@ -47,7 +47,8 @@ struct MemoryRun {
 /// Returns bytes or words of the unit's memory in hexadecimal, for programs: "005a", "005a1234".
 [[nodiscard]] std::string words_in_json(const Unit& unit, std::span<const std::uint32_t> words);
 
-/// Returns `image` as runs in the order of their addresses, each of at most `longest` words.
+/// Returns `image` divided into series of consecutive addresses, in the order of the addresses; each series has at most
+/// `longest` bytes or words.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
 
 /// Returns all addresses that a dump of the unit's memory contains, each with the value 0.
@@ -114,7 +115,7 @@ class MemoryChange {
   /// Prepares the change without sending anything. Throws UsageError.
   MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
-  /// Checks the model and reads the bytes that are stored at the wanted addresses.
+  /// Checks the model, and reads the bytes that are now stored at the addresses to be written.
   void look(const MemoryProgress& progress = {});
   /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});
@@ -125,9 +126,9 @@ class MemoryChange {
 
   /// Returns the bytes that the memory is to contain, with their addresses.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
-  /// Returns the bytes that `look` read at the wanted addresses.
+  /// Returns the bytes that `look` read at the addresses to be written.
   [[nodiscard]] const MemoryImage& found() const { return found_; }
-  /// Returns the bytes that differed when `look` read them, with their wanted values.
+  /// Returns those bytes to be written that differed from the bytes that `look` read.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and read back, without those that `verify` found changed.
   [[nodiscard]] const MemoryImage& written() const { return written_; }

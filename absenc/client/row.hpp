@@ -17,7 +17,7 @@ namespace absenc::client {
 /// Type of the values in a column.
 enum class ColumnType : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
 
-/// Name, unit, type and meaning of a value that each row has.
+/// Name, unit of measure, type and meaning of a value that each row has.
 struct Column {
   /// Number format in text and CSV, and which tables or lists leave the value out.
   struct Presentation {

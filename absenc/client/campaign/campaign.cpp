@@ -115,10 +115,12 @@ class Campaign {
   // Moves the shaft to a random position of 64 bits, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // older shaft positions are forgotten: no fault delays a reply for so long
+    // positions that the shaft left longer ago are forgotten, because no fault delays a reply for so long
+    constexpr Time longest = 30s;
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // Waits until frames with the old position have passed; on SPI, chip select must be released for some time.
+    // Lets unsolicited frames with the old position arrive for 5 ms and drops them. On SPI, leaves a pause of 20 us
+    // before the next transfer, because chip select must be released for some time.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
@@ -172,7 +174,8 @@ class Campaign {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  // A frame that is shifted by some bits passes the checksum only at some shaft positions, so many replies are needed.
+  // Many replies at different shaft positions are needed to estimate how many damaged replies are accepted: a frame
+  // that is shifted by some bits passes the checksum only at some shaft positions.
   constexpr unsigned frames = 20'000;
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);

@@ -95,7 +95,7 @@ TEST(CampaignTest, EveryFaultIsThere) {
   for (const LineFault& fault : line_faults()) {
     const CampaignResult result = run("tformat", {std::string(fault.name) + "=0.1"}, 20'000);
     const bool harmless =
-        fault.name == "delay";  // a reply that is 200 us late still arrives within the timeout, or is dropped as late
+        fault.name == "delay";  // a reply that comes 200 us later arrives within the timeout, or is dropped as late
     EXPECT_GT(result.failed.count, harmless ? 0u : 500u) << fault.name;
     EXPECT_EQ(result.older.count, 0u) << fault.name;
     EXPECT_LT(result.failed.count, result.exchanges) << fault.name;

@@ -159,7 +159,8 @@ std::vector<double> CheckCode::weights(unsigned most) const {
   std::vector<double> words(most + 1);
   for (std::size_t weight = 0; weight < dual.size(); ++weight) {
     if (dual[weight] == 0) continue;
-    // Computes the Krawtchouk polynomials at this weight of dual code words, each from the two polynomials before it.
+    // MacWilliams identity: `now` is the Krawtchouk polynomial of degree k at `weight`, computed from those of the two
+    // degrees below.
     double before = 0;
     double now = 1;
     for (unsigned k = 0; k <= most; ++k) {
@@ -189,8 +190,8 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// Estimates by importance sampling: draws only errors that the checksum does not detect, because the decoder accepts no
-// reply with another error.
+// Estimates the share by importance sampling: draws only errors that the checksum does not detect, because the decoder
+// rejects a reply with any other error.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

@@ -82,10 +82,10 @@ class LetThrough {
       : counts_per_second_(host::counts_per_second(resolution, limit)), bits_(bits) {}
 
   void add_position() { ++positions_; }
-  /// Adds a wrong position of a reading, as its distance in counts from the true position.
+  /// Adds a reading with a wrong position to the statistics. `away`: wrong minus true position, in counts.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// Adds a comparison of two consecutive readings. `moved`: counts by which the shaft moved between these two;
-  /// `before`: counts by which it moved between the two readings of the comparison before.
+  /// Adds two consecutive readings to the statistics. `between`: time from one to the other; `moved`: counts by which
+  /// the shaft moved during this time; `before`: value of `moved` for the two readings before.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }

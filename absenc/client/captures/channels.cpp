@@ -80,7 +80,8 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
 }
 
 bool is_needed(LinkKind link, std::string_view wire) {
-  // A capture of a full-duplex line may contain the host's or the encoder's wire alone.
+  // On a full-duplex line no wire is needed by itself: a capture may contain only the host's wire, or only the
+  // encoder's.
   if (link == LinkKind::full_duplex) return false;
   return wire != "cs" && wire != "mosi" && wire != "data_out" && wire != "direction";
 }

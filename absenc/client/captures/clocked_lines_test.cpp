@@ -28,7 +28,8 @@ class Wires {
   // Draws a change of the data line, `behind` nanoseconds after the clock edge that causes it.
   void data(bool level, std::int64_t behind = 5) { changes_[{now_ + behind, 'd'}] = level; }
 
-  /// Draws `count` clock periods; the data line becomes `bit(i)` behind rising edge i, from 1 on.
+  /// Draws `count` clock periods of `period` nanoseconds. After rising edge i, counted from 1, the data line becomes
+  /// `bit(i)`.
   template <class Bit>
   void burst(std::int64_t period, std::size_t count, Bit&& bit) {
     for (std::size_t i = 0; i < count; ++i) {

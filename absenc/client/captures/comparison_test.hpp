@@ -118,8 +118,9 @@ class Comparison {
     return std::find(of_rows.begin(), of_rows.end(), live) != of_rows.end();
   }
 
-  // Returns whether a capture can compose several exchanges into one result. Composed frames are bytes, so on a line
-  // whose frames are bits, alarms that the host reads as words of the memory are not part of any row's position.
+  // Returns whether a capture can compose several exchanges into one result: only exchanges of bytes can be composed.
+  // On a bidirectional clocked line, alarms that the host reads as words of the memory are therefore missing in every
+  // row that has a position.
   [[nodiscard]] bool composes() const { return unit_.link != LinkKind::clocked_bidirectional; }
 
   [[nodiscard]] bool is_of(const Said& row, const Reading& reading) const {

@@ -20,9 +20,10 @@ namespace {
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-// number of replies, good or bad, with which a protocol can be judged, so that decoding stops
+// number of replies, good or bad, at which decoding stops: they suffice to decide whether the capture has this protocol
 constexpr std::size_t enough = 300;
-// number of bytes outside of frames with which a protocol can be judged, so that decoding stops
+// number of bytes outside of frames at which decoding stops: they suffice to decide whether the capture has this
+// protocol
 constexpr std::size_t enough_noise = 3000;
 
 /// Thrown to stop decoding when enough of the capture was read.
@@ -93,8 +94,8 @@ std::vector<Options> bases(const Unit& unit) {
   return all;
 }
 
-// Searches with the options of `bases`, and again with options that were found, because the division into frames
-// depends on the options.
+// Searches for options with which the unit explains the capture. Decodes the capture with the options of `bases`, and
+// again with the options that this search has found, because the division into frames depends on the options.
 std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
                                     Sentences& damages) {
   std::vector<Hypothesis> best;

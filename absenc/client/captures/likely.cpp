@@ -143,7 +143,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // Prefers a pause after which the encoder was seen to time out: without a timeout it would continue the old word.
+  // Prefers a pause length with which the data line changes in every pause between words: the encoder then timed out
+  // after each word. Without a timeout it would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

@@ -18,7 +18,8 @@ struct Probed {
   bool explained = false;
   // evidence for or against each value of the options that the document leaves open
   std::vector<OptionEvidence> evidence{};
-  // values that the frames leave for options, which `decode` and `read` need as settings "name=value"; may be empty
+  // settings "name=value" that `decode` and `read` must be given: options for which the frames leave a single value,
+  // and options with several possible values whose chosen value is not the default; may be empty
   std::vector<std::string> settled{};
 };
 

@@ -238,7 +238,8 @@ CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::
                             .in = wires.wires[1],
                             .out = spi || turns ? wires.wires[2] : std::nullopt,
                             .select = spi ? wires.wires[3] : std::nullopt,
-                            // At a falling edge both host and encoder have driven their bit for half a period.
+                            // On a bidirectional line bits are read at the falling edge of the clock: there both host
+                            // and encoder have driven their bit for half a period.
                             .rising = !turns && (line_.spi_mode == 0 || line_.spi_mode == 3),
                             .direction = turns ? wires.wires[3] : std::nullopt,
                             .low_goes_on = turns,
@@ -288,7 +289,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
     outcome.end = std::max(outcome.end, block.end);
     progress(block.end);
   });
-  // A log ends at the time of its last line; a pause behind it ends the last frame.
+  // A log ends at the time of its last line, so a pause is assumed to follow it, which ends the last frame.
   if (annotator != nullptr) annotator->finish(outcome.end + settings.ticks.pause);
   return outcome;
 }

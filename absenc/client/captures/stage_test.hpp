@@ -31,7 +31,8 @@ struct Said {
   std::string words{};
   Answer answer{};
   std::optional<Reading> reading{};
-  bool reads = false;       // whether the verb is `read` or `read_part`: all values come from replies of the encoder
+  // whether the verb is `read` or `read_part`, so that all values come from the encoder's replies
+  bool reads = false;
   bool is_special = false;  // whether the verb is `run`; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
   // whether the error is a verdict over several replies, not an error of the last one

@@ -109,7 +109,7 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
 // ---- Clauses about the memory
 
 void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
-  // saves the setting that the clause is about, because reading the memory changes it
+  // saves the setting that access to this memory byte changes, such as the selected bank
   if (!clause.setting.empty()) save_setting(clause);
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();

@@ -127,8 +127,8 @@ struct Bench {
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
   /// Returns position and settings as text. The memory is left out, because an encoder may count its writes in it.
   [[nodiscard]] std::string settings() const {
-    // The conformance test may have ended when the encoder had another baud rate, or just after a restart of the
-    // encoder.
+    // Sets the port to the baud rate of the address and waits for 2 s: the conformance test may have ended while the
+    // line had another baud rate, or just after a restart of the encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
@@ -151,7 +151,7 @@ struct Bench {
     if (position != address.unit->fields.end()) add_value(*find_command(*address.unit, Verb::read), position->name);
     return text;
   }
-  // Runs the test on a link that does not own the device, which is inspected afterwards.
+  // Runs the conformance test on a link that does not own `device`, because `device` is inspected after the test.
   [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
     Link port_link;
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -319,7 +319,7 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // If the memory differs even after a complete test, the encoder counts its writes in the memory.
+  // If even a complete test leaves the memory changed, the encoder counts its writes in the memory.
   const bool counts = whole.memory() != before;
   // A test with many steps is ended at each of them in only one of the three ways: interrupt, short loss of the line,
   // or cancellation.

@@ -213,7 +213,8 @@ ReplyChanges<Item> special_request_mutants(const Clause& clause) {
         };
       }});
     };
-    // In both changed replies the low 8 bits of the identifier are those of the request: the node number.
+    // Two mutants change the identifier of the reply. In both, the low 8 bits of the new identifier are those of the
+    // request: the node number.
     with_request_id([](Item& reply, std::uint32_t id) { reply.id = (reply.id & ~0xFFU) | (id & 0xFF); });
     with_request_id(
         [](Item& reply, std::uint32_t id) { reply = {.id = 0x100 | (id & 0xFF), .size = 8, .data = {0x11}}; });
@@ -239,7 +240,8 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     case Demand::in_time:
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 15ms; });
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 60ms; });
-      // A host may wait longer by the duration of some characters, so on a slow line the reply must be later, too.
+      // On a slow line a delay of 60 ms may still be in time, because a host may wait longer than the timeout by the
+      // duration of some characters. So the last mutant delays replies by 8 characters more.
       add_reply_mutants<Item>(all, [late = 60ms + 8 * address.line.with_some_rate().character()](Mutant<Item>& m) {
         m.change_reply = [late](List&, Step<Item>& step) { step.at += late; };
       });

@@ -79,7 +79,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;
   try {
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 3});
-    // An encoder whose report equals that of an earlier one needs no second check.
+    // If an earlier encoder had the same report, the mutants are not tested again.
     if (!seen.insert(good.report()).second) return;
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;

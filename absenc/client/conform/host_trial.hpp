@@ -21,7 +21,7 @@ class HostTrial {
 
   HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
-  /// Counts of requests, replies and rules since the test began.
+  /// Counts of requests, replies and checks of rules since the test began.
   struct TrialCounts {
     std::uint64_t answered = 0;  // requests that the encoder answered, including replies that a fault suppressed
     std::uint64_t missing = 0;   // replies that the fault `silence` suppressed

@@ -274,7 +274,8 @@ void check_stranger_hosts(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (carries_bits(other->link) || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
-    // Skips empty requests, and requests of the other unit that the tested unit accepts, too.
+    // Skips units without a request in bytes or frames, and units whose request is also a valid request of the tested
+    // unit.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }

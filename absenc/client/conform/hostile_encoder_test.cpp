@@ -58,7 +58,7 @@ class TapPort final : public Port<Item> {
 };
 
 /// A device that is no encoder: it replies to each request with the bytes or frames that `next` returns. If the encoder
-/// would send unsolicited frames, it sends them unsolicited.
+/// at this address would send unsolicited frames, the device sends those bytes or frames unsolicited.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:

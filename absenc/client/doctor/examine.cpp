@@ -45,9 +45,11 @@ struct Ratio {
   std::uint32_t times, divisor;
 };
 constexpr std::array<Ratio, 7> swept{{{1, 8}, {1, 4}, {1, 2}, {1, 1}, {3, 2}, {2, 1}, {4, 1}}};
-constexpr std::uint32_t slowest_swept = 10'000;      // Hz
-constexpr std::uint32_t fastest_swept = 10'000'000;  // Hz, where the document states no limit
-constexpr std::int64_t resting_counts = 8;           // positions of a resting shaft differ by this at most
+constexpr std::uint32_t slowest_swept = 10'000;  // lowest clock rate that is tried, in Hz
+// highest clock rate that is tried, in Hz, if the document states no limit
+constexpr std::uint32_t fastest_swept = 10'000'000;
+// greatest difference between positions of a resting shaft, in counts
+constexpr std::int64_t resting_counts = 8;
 
 bool is_serial(const EncoderAddress& address) {
   return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
@@ -122,12 +124,14 @@ class Doctor {
     if (is_serial(address_)) count_damage();
   }
 
-  // Reads the facts of the port again, after it was closed, and stores how much the driver's error counters have grown.
+  // Reads the properties of the port again, after it was closed, and stores how much the driver's error counters have
+  // grown.
   void count_damage() {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
     seen_.facts.kernel_direction = now.kernel_direction;
-    // absenc may have shortened the driver's latency timer when it opened the port
+    // the earlier value may be out of date: absenc may have shortened the driver's latency timer when it opened the
+    // port
     seen_.facts.latency_timer = now.latency_timer;
   }
 
@@ -158,8 +162,8 @@ class Doctor {
       }
       examiner.conclude(seen_);
     }
-    // On a CAN bus other settings are tried only if nothing was heard, because other bit rates would destroy frames of
-    // other devices.
+    // On a CAN bus other settings are tried only if nothing was received, because other bit rates would destroy frames
+    // of other devices.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
     const bool may_be_settings = hardly_any_good(seen_.readings) && !seen_.never_silent && seen_.lateness == Time{};
     if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();
@@ -230,8 +234,9 @@ class Doctor {
     return false;
   }
 
-  // Reads in turns with a setting and with the user's, because an encoder that was silent for a while would otherwise
-  // make the later one look better. Stores the trial if the setting is far better. Returns whether the search is over.
+  // Reads in turns with a tried setting and with the user's setting: if all readings with one setting came last, an
+  // encoder that was silent for a while at first would make this setting look better. Stores the trial if the tried
+  // setting is far better. Returns whether the search is over.
   template <class Item>
   bool compare(const EncoderAddress& other, Trial& trial) {
     std::vector<Attempted> theirs;
@@ -324,8 +329,8 @@ class Doctor {
     return {};
   }
 
-  // Returns whether no reading is good and no finding explains it with certainty, so that another protocol may be the
-  // reason.
+  // Returns whether no reading is good and no finding explains with certainty why, so that the encoder may have another
+  // protocol.
   [[nodiscard]] bool is_unexplained() const {
     if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
     const Examination so_far = judge(*address_.unit, address_.options, seen_);

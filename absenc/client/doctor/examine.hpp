@@ -20,7 +20,8 @@ struct Surroundings {
   bool on_the_clock = false;
 };
 
-/// Examines an encoder like client::examine of client/doctor.hpp, over the ports and facts of `surroundings`.
+/// Examines an encoder like client::examine of client/doctor.hpp, but opens ports and reads their properties with the
+/// functions of `surroundings`.
 [[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
                                   const Surroundings& surroundings = {.on_the_clock = true});
 

@@ -83,14 +83,16 @@ class Examiner {
       const auto attempt = [&] {
         failed.clear();
         Attempted one = attempt_reading(command);
-        // The reading itself contains its last request, so this request is no repeated one.
+        // The failure of the last request is already part of the reading, so it is not stored a second time as a
+        // repeated request.
         if (!failed.empty() && failed.back().began == runner_.last().sent_at) failed.pop_back();
         std::ranges::move(failed, std::back_inserter(seen.repeated));
         if (streams_) stream.append(runner_.last());
         return one;
       };
       runner_.repeat(series(count, limit), attempt, seen.readings);
-      // A stream has no requests: an encoder that sends a frame for each pulse of the host is polled.
+      // Judges a stream only if the host has sent nothing: an encoder that sends a frame for each pulse of the host is
+      // polled, and sends no stream.
       if (streams_ && before == 0 && runner_.port().requests == 0) conclude_stream(unit_, options_, stream, seen);
     }
   }
@@ -181,7 +183,7 @@ class Examiner {
   const Unit& unit_;
   Options options_;
   bool streams_;
-  std::function<void(const LineExchange<Item>&)> observer_{};  // set by Hook
+  std::function<void(const LineExchange<Item>&)> observer_{};  // called with each exchange; empty unless a Hook exists
 };
 
 }  // namespace absenc::client

@@ -174,8 +174,9 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// A bit is sampled half a period after the edge at which the encoder changes it, so a clock that is too fast shows how
-// long the way from edge to data is. BiSS finds its start bit, so there a delay only shifts the bits by whole clocks.
+// A bit is sampled half a period after the clock edge at which the encoder changes it, so the lowest clock rate that
+// fails shows how long the data needs to follow the clock through cable and encoder. The host of BiSS finds the start
+// bit, so there a delay only shifts the bits by whole clocks.
 void judge_clocks(const Case& one, std::vector<Finding>& findings) {
   const std::vector<ClockTrial>& clocks = one.seen.clocks;
   const auto is_bad = [](const ClockTrial& trial) { return trial.good < trial.tried; };

@@ -356,7 +356,8 @@ std::optional<Finding> false_echo(const Case& one) {
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds one or two bytes after at least 8 of 10 good replies, too few for a second reply.
+// Finds one or two further bytes that follow at least 8 of 10 good replies, and are too few for a reply of a second
+// encoder.
 std::optional<Finding> byte_behind_good(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};

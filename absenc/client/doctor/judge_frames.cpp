@@ -358,8 +358,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     return;
   }
   if (most(all, [](const Attempted& attempt) { return attempt.error == Error::out_of_range; })) {
-    // The checksums are right, but values are out of range. With another format all replies may be good, including
-    // those that are good now.
+    // The checksums are right, but values are out of range, so the frames may have another format than the options
+    // state. With other options all replies may be good, including those that are good with the present options.
     if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
       findings.push_back(std::move(*other));
       return;

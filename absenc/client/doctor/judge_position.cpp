@@ -131,8 +131,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// Finds bits of the position that never change. Needs steps of different sizes: with equal steps even a sound bit may
-// never change.
+// Finds bits of the position that never change. Needs movements of different sizes between readings: if all are equal,
+// even a bit without a fault may never change.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

@@ -114,7 +114,8 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
     // flags that come with an invalid position or invalid turns are reported first
     return (before.invalid > 0) > (after.invalid > 0);
   });
-  // A flag that far fewer readings report than failed may be damage that the checksum missed.
+  // If the readings that report a flag are fewer than a tenth of the failed readings, the flag may be damage that the
+  // checksum missed.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
@@ -157,8 +158,8 @@ std::optional<Finding> judge_start(const Case& one) {
   const auto failed = static_cast<std::size_t>(first - readings.begin());
   if (failed < 2 || failed + one.good != readings.size()) return {};
   const auto silent = std::count_if(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
-  // Some of the first replies may be damaged, because the encoder may begin to reply in the middle of a request; most
-  // must be missing.
+  // An encoder that starts may begin to reply in the middle of a request, so some of the failed readings may have a
+  // damaged reply; at least half of them must have no reply.
   if (static_cast<std::size_t>(silent) * 2 < failed) return {};
   // If this computer stood still for as long as the failures lasted, it may itself have delayed the first replies.
   if (first->began - readings.front().began <= one.seen.computer_late) return {};

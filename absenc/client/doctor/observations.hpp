@@ -33,10 +33,12 @@ struct Trial {
 
 /// Readings with one clock rate.
 struct ClockTrial {
-  std::uint32_t rate = 0;  // Hz
-  std::size_t good = 0;    // readings without an error and, if the shaft rested, with the position of those before
+  std::uint32_t rate = 0;  // clock rate in Hz
+  // number of readings without an error and, if the shaft rested, with about the same position as the readings before
+  // this trial
+  std::size_t good = 0;
   std::size_t tried = 0;
-  bool is_set = false;  // whether this is the clock that the user has set
+  bool is_set = false;  // whether `rate` is the clock rate that the user has set
 };
 
 /// The reason why the port could not be opened, or was lost.

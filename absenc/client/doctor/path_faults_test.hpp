@@ -78,8 +78,8 @@ inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64
               for (std::size_t i = 0; i < probed; ++i) static_cast<void>(read_once(asked, opener));
               if (opener.changed() * 2 < probed) continue;
               const Outcome one{examined(pair.asked, pair.far), causes};
-              // The shaft may have left the positions that the fault changes, because readings on a slow line take many
-              // seconds.
+              // Tries the next position if fewer than half of the replies were changed: readings on a slow line take
+              // many seconds, in which the shaft may leave the positions whose replies the fault changes.
               if (one.seen.changed * 2 < one.seen.examination.tried) continue;
               outcome = one;
               break;
@@ -195,7 +195,8 @@ inline std::vector<PathFault> faults_of_others() {
   std::vector<PathFault> faults;
   faults.push_back({"another protocol", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       std::optional<Outcome> last;
-                      // Takes the first other protocol that has a usual rate, so that `identify` can find it.
+                      // Takes the first other protocol whose unit states a usual baud rate, so that `identify` can find
+                      // it.
                       for (const Unit* other : character_units()) {
                         if (other == &unit || other->line.rate == 0) continue;
                         Pair pair = pair_of(unit, mode, rate);

@@ -30,7 +30,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
       const std::string_view id = id_of(finding_kind);
       if (of_serial_ports.contains(id)) continue;
       if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers"))
-        continue;  // a simulated port can always be opened, and no modem answers there
+        continue;  // doctor cannot have these findings here: a simulated port always opens, and has no modem
       const std::string advice = advice_of(finding_kind, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
         EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];

@@ -15,7 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-// least number of stream pieces, of distances between frames, or of doubled frames from which a conclusion is drawn
+// least number of pieces of the stream between pauses, of times between frames, or of doubled frames from which a
+// conclusion is drawn
 constexpr std::size_t enough = 8;
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.
@@ -24,7 +25,8 @@ struct PausedBytes {
   ByteList bytes{};
 };
 
-// Returns the pieces of the stream between pauses, without the first and the last, which may be cut.
+// Divides the stream where no byte arrived for at least `pause`, and returns the pieces. Leaves out the first and the
+// last piece, which may be cut.
 std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   std::vector<PausedBytes> pieces;
   std::size_t begin = 0;
@@ -52,8 +54,8 @@ double evenness(const std::vector<PausedBytes>& pieces) {
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
 }
 
-// Divides a stream at pauses of the length that gives the most even pieces. If several lengths do equally well, takes
-// the middle one, which is the safest.
+// Divides a stream into pieces at its pauses, with the pause length that gives the greatest share of pieces of equal
+// size. If several lengths do about equally well, takes the middle one, which is the safest.
 std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;

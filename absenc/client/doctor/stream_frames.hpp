@@ -25,7 +25,7 @@ struct StreamBytes {
   void append(const LineExchange<std::uint8_t>& line);
 };
 
-/// Divides the stream at its pauses and returns each piece as a reading.
+/// Divides the stream at its pauses and returns a reading for each frame between two pauses.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 

@@ -92,7 +92,8 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
         Other{finding_kind, fmt::format("{}={}", name, said), fmt::format("{}={}", name, set), address});
   };
   for (std::uint8_t other = 0; other < 4; ++other) {
-    // An MPSSE has one way to sample for each level at which the clock rests.
+    // The MPSSE of an FTDI chip can sample at only one edge for each idle level of the clock, so for it only an SPI
+    // mode with the other idle level is another setting.
     const bool same =
         address.port_kind == PortKind::ftdi ? (other & 1) != 0 || (other & 2) == (mode & 2) : other == mode;
     if (!same) add(FindingKind::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
@@ -252,7 +253,8 @@ bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said
            std::lgamma(static_cast<double>(all - some + 1));
   };
   const std::size_t all_good = good + good_as_said;
-  // probability that by chance at least as many of all good readings would be among those with the tried setting
+  // probability that at least `good` of all good readings would have the tried setting if both settings were equally
+  // good
   double sum = 0;
   for (std::size_t more = good; more <= std::min(tried, all_good); ++more) {
     if (all_good - more > tried_as_said) continue;

@@ -31,7 +31,8 @@ struct Other {
 /// Returns a search for encoders on the port of the address, with the user's settings of latency and RS-485.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
-/// Returns whether at least 8 of 10 readings are good and chance (Fisher's exact test) is unlikely.
+/// Returns whether at least 8 of 10 readings with a tried setting are good, and so many more than with the user's
+/// setting that the probability of this by chance is below 1/1000 (Fisher's exact test).
 [[nodiscard]] bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said,
                                  std::size_t tried_as_said);
 

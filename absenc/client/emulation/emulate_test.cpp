@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests a virtual encoder on a port. A latency of half a second allows for a busy computer.
+// Tests a virtual encoder on a port. The setting latency=500 allows replies to come half a second late, as on a busy
+// computer.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

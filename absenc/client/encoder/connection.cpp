@@ -351,7 +351,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
-  // Returns the bits that the host received with its last clocks, as text.
+  // Returns the bits that the host clocked in during the last exchange, as text.
   [[nodiscard]] std::string clocked_text() const {
     return to_wire_text(unit().link, to_frame(std::span<const Item>(line_.received), line_.clocks));
   }

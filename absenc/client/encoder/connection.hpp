@@ -49,7 +49,8 @@ class Connection {
 
   /// Reads the position. Throws UsageError and the exceptions of the port.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// Runs a command. Calls `on_emit` at each intermediate result; `report` then passes that result on.
+  /// Runs a command. Calls `on_emit` at each intermediate result, so that `on_emit` can call `report`, which passes
+  /// this result to a sink.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// Stores the value that the next changing command overwrites, for the journal.
   void know_before(std::int64_t value) { known_before_ = value; }

@@ -17,8 +17,9 @@ template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
   // The encoder latches before the request ends if the host clocks the bits or triggers the encoder by a pulse.
   const Time earliest = std::min(exchange.sent_at, latched) - exchange.sent_late;
-  // Subtracts 15/16 of the duration of all characters but one: the last one may be reported before its stop bit ends,
-  // and clocks differ.
+  // The encoder latched before its reply began: subtracts from the arrival of the reply 15/16 of the duration of all
+  // its characters but one. The last character may be reported before its stop bit ends, and the clocks of host and
+  // encoder differ.
   const auto characters = static_cast<std::int64_t>(std::max<std::size_t>(exchange.reply().size(), 1)) - 1;
   const Time reply = characters * character * 15 / 16;
   return {earliest, std::max(earliest, exchange.received_at - reply)};

@@ -60,7 +60,7 @@ std::vector<std::string> settings_for(const Unit& unit, const Options& options) 
     if (by_model.size() <= settings.size()) return by_model;
   }
   if (resolves_to(unit, {}, settings, options)) return settings;
-  // A list of only the differing settings does not select these options, so the list names all options.
+  // The settings that differ from the defaults do not select these options by themselves, so all options are named.
   return option_texts(unit, options);
 }
 

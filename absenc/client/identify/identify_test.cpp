@@ -57,7 +57,7 @@ Counted damaged_by_runner(const std::string& text, const std::vector<std::string
   Runner<std::uint8_t> runner(place.encoder);
   runner.attach(*link.bytes, link.latency);
   std::size_t damaged = 0;
-  // Runs the unit's scan first, as the search does, so that both send the same requests and meet the same faults.
+  // Runs the unit's scan first, as the search in `asked` does, so that the same faults affect the readings of both.
   if (const Command* scan = find_command(*place.encoder.unit, Verb::scan)) static_cast<void>(runner.once(*scan));
   for (std::size_t i = 0; i < count; ++i) {
     runner.start_again();
@@ -89,8 +89,8 @@ TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
       SCOPED_TRACE(fmt::format("{}{}", fault, echo ? " with echo" : ""));
       const auto [evidence, requests] = asked(text, {fault}, {.echo = echo});
       const Counted wanted = damaged_by_runner(text, {fault}, evidence.tried, {.echo = echo});
-      // The faults do not strike the same readings if the scan was repeated or found several encoders, so no comparison
-      // is made.
+      // If the search has repeated the scan or found several encoders, it has sent other requests than the runner. Then
+      // the faults affect other readings, so no comparison is made.
       if (wanted.requests != requests) continue;
       EXPECT_EQ(evidence.tried - evidence.explained, wanted.damaged);
       damaged += wanted.damaged;

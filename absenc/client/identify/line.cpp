@@ -211,7 +211,7 @@ class Search {
   void attempt_on(const Unit& unit, const SettingTexts& settings, const Effort& effort) {
     if (search_.now() >= deadline_) throw OutOfTime{};
     Attempt<Item> one(search_, unit, settings, effort, deadline_, findings_);
-    // skips a unit without a usual rate now; it is tried at other rates later
+    // skips a unit without a usual baud rate now; the search tries it at other rates later
     if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {

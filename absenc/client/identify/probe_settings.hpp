@@ -34,9 +34,9 @@ enum class Medium : std::uint8_t { serial, tcp, spi, ftdi, can };
 /// Returns the request of the command with default arguments; empty if the command has no request that can be encoded.
 [[nodiscard]] std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command);
 
-/// Returns the sets of settings to try in addition to `settings`, at most 8: no further setting, and models and single
-/// choices that change the request. On clocked lines, where the request is the same for all models, returns no further
-/// setting and each model. Settings with which the encoder sends unsolicited are left out.
+/// Returns the sets of settings to try in addition to `settings`, at most 8: the empty set, and a set for each model or
+/// choice of an option that changes the request. On clocked lines, where the request is the same for all models,
+/// returns the empty set and a set for each model. Leaves out settings with which the encoder sends unsolicited frames.
 [[nodiscard]] std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings,
                                                         const Command& read);
 

@@ -190,7 +190,7 @@ std::pair<bool, std::string_view> carries(PortKind place, const Unit& unit) {
     case PortKind::can:
     case PortKind::slcan:
       return {unit.link == LinkKind::can, "a CAN adapter"};
-    case PortKind::spi:  // a controller of Linux cannot turn the direction of a line
+    case PortKind::spi:  // an SPI controller of Linux cannot switch its data line between sending and receiving
       return {host_clocks(unit.link) && unit.link != LinkKind::clocked_bidirectional, "an SPI controller"};
     case PortKind::ftdi:
       return {host_clocks(unit.link), "the clock of an FTDI chip"};

@@ -124,10 +124,10 @@ struct EncoderAddress {
 /// Returns the port if `text` is the address of a port without a protocol, as "/dev/ttyUSB0"; otherwise nothing.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
-/// First part of a place on an FTDI chip: "ftdi", "ftdi:SERIAL", "ftdi:SERIAL/B", "ftdi/B".
+/// Beginning of the name of an FTDI chip as a port: "ftdi", "ftdi:SERIAL", "ftdi:SERIAL/B", "ftdi/B".
 inline constexpr std::string_view ftdi_name = "ftdi";
 [[nodiscard]] bool is_ftdi_place(std::string_view text);
-/// Returns the place whose EncoderAddress::path is `path`.
+/// Returns the name of an FTDI chip as a port, as "ftdi:SERIAL/B", for the EncoderAddress::path `path`, as "SERIAL/B".
 [[nodiscard]] std::string ftdi_place(std::string_view path);
 
 /// Parses an address and further `settings` ("name=value"). Throws UsageError.

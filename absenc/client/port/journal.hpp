@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The journal of changes of encoders. Tabs separate the fields of a line: time (UTC), encoder, what, old value, new
-// value, result, command that restores the old value.
+// The journal of changes of encoders. Tabs separate the fields of a line: time (UTC), encoder, kind of the change as a
+// verb or command of absenc, old value, new value, result, command that restores the old value.
 #pragma once
 
 #include <cstddef>

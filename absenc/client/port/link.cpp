@@ -113,7 +113,7 @@ Link open_ftdi(const EncoderAddress& uri) {
 
 Link open_can(const EncoderAddress& uri) {
   Link link;
-  // the text names no bit rate, because the system sets the bit rate of the interface, not absenc
+  // `place` names no bit rate, because the system sets the bit rate of the interface, not absenc
   link.place = uri.path;
   take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
   return link;

@@ -14,7 +14,8 @@ namespace absenc::client {
 struct FoundPort {
   std::string path{};       // path or name of the port: "/dev/ttyUSB0", "can0", "/dev/spidev0.0", "ftdi:FT1ABC"
   std::string_view kind{};  // kind of the port: "serial", "can", "spi" or "ftdi"
-  os::ListedPort serial{};  // details of a serial port, or of an FTDI chip that clocks; empty for other kinds
+  // details of a serial port, or of an FTDI chip that can clock an encoder; empty for other kinds of ports
+  os::ListedPort serial{};
 
   /// Returns the command of absenc that may help with the port, as "absenc identify /dev/ttyUSB0"; may be "".
   [[nodiscard]] std::string next_command() const;

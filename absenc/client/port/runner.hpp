@@ -393,7 +393,7 @@ class Runner {
   Filter filter_;
   std::optional<host::Session<Item>> session_;
   bool open_ = false;                  // whether the last exchange has not been passed to `on_exchange` yet
-  std::uint64_t opened_at_ = 0;        // number of requests that were sent before the open exchange began
+  std::uint64_t opened_at_ = 0;        // number of requests that were sent before the last exchange began
   std::uint64_t requests_before_ = 0;  // number of requests that were sent before the present command
   // number of bytes or frames that were received before the present command began; they belong to an older request
   std::size_t received_before_ = 0;

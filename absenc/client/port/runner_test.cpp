@@ -88,7 +88,8 @@ TEST(Runner, AReplyThatComesTwiceIsNotTakenForAnEcho) {
   EXPECT_EQ(one.exchange.reply.bytes, one.raw);
   EXPECT_EQ(one.raw.front(), 0x1A);
   for (int i = 0; i < 2; ++i) {
-    // waits until the line is silent: the repeated reply would collide with the next request
+    // waits until the line is silent: the fault sends each reply twice, and the second one would collide with the next
+    // request
     bench.runner.settle(1ms, 10ms);
     EXPECT_EQ(bench.once().error, Error::none);
   }

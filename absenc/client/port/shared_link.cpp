@@ -78,7 +78,8 @@ bool SharedLink::lost() const {
 void SharedLink::lose(const os::Failure& failure) {
   const std::lock_guard lock(mutex_);
   loss_ = {failure.kind(), failure.what()};
-  link_.owner.reset();  // closes the port at once, because an exclusive port can be opened only once
+  // closes the lost port at once, because an exclusive port can be opened again only after it was closed
+  link_.owner.reset();
 }
 
 bool share_line(const EncoderAddress& one, const EncoderAddress& other) {

@@ -43,7 +43,8 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // Delays no transfer that has a time of its own, because that time may have a meaning, as inside a procedure.
+    // Delays only transfers that may begin at once: if a later time is set, it may have a meaning, as inside a
+    // procedure.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }

@@ -59,7 +59,8 @@ enum class RecordForm : std::uint8_t { csv, json_lines, hdf5 };
 /// Creates a file as `make_record_file` does, but only as HDF5.
 using Hdf5FileMaker = std::unique_ptr<RecordFile> (*)(const std::string& path, std::span<const Column> columns,
                                                       const RecordHeader& header);
-/// Sets the maker of this program; without one HDF5 is refused. Call it before threads are started.
+/// Sets the function by which this program creates HDF5 files; without one, HDF5 is refused. Call it before threads are
+/// started.
 void set_hdf5_file_maker(Hdf5FileMaker maker);
 
 }  // namespace absenc::client

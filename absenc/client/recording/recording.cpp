@@ -132,8 +132,8 @@ std::string Recording::Parts::part_path(unsigned part) const {
   return path.parent_path() / name;
 }
 
-// Throws if the folder has parts of an older recording with the same name, because the names of new parts might reach
-// theirs.
+// Throws if the folder has parts of an older recording with the same name: new parts count up, and might reach the
+// number of an old part.
 void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";

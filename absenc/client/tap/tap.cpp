@@ -34,7 +34,7 @@ struct Tap::Parts final : capture::AnnotationSink {
       if (is_over) return end();
       filled = at = 0;
       is_over = !run.advance();
-      --at;  // goes before the first new row, because the loop condition moves on by one row
+      --at;  // `at` is then one before the first new row, because the loop condition increments it
     }
     return &ready[at];
   }

@@ -39,7 +39,7 @@ std::size_t distance(std::string_view from, std::string_view to) {
 
 std::string_view nearest(std::string_view written, std::span<const std::string_view> names) {
   std::string_view best;
-  // a name is near if its edit distance is at most one third of the written letters plus one
+  // a name is near if its edit distance is at most 1 plus one third of the number of written letters
   std::size_t best_distance = written.size() / 3 + 2;
   for (const std::string_view name : names) {
     const bool begins = written.size() >= 3 && name.starts_with(written);
