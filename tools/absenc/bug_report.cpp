@@ -30,7 +30,7 @@ constexpr const char* doctor_file = "doctor.json";
 constexpr const char* exchanges_file = "exchanges.txt";
 constexpr std::string_view no_frame = "-";
 constexpr std::string_view masked_frame = "masked";
-constexpr std::size_t longest_part = 1 << 24;  // in bytes
+constexpr std::size_t longest_part = 1 << 24;  // greatest size of a file in a report, in bytes
 
 std::string wire_text(LinkKind link, const Frame& frame) {
   return frame.empty() ? std::string(no_frame) : to_compact_wire_text(link, frame);
@@ -57,7 +57,7 @@ std::string read_part(capture::ZipArchive& archive, const std::string& path, con
   return {bytes.begin(), bytes.end()};
 }
 
-// Returns the adapter in words, with its own serial number masked.
+// Returns the properties of the adapter as text, with its serial number only if `serial_numbers` allows that.
 std::string adapter_text(const EncoderAddress& address, ReportedExchanges::SerialNumbers serial_numbers) {
   if (address.port_kind != PortKind::serial) return "adapter: not a serial port\n";
   const os::ListedPort port = os::inspect_port(address.path);

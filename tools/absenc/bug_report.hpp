@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A report of doctor as one file, for those who correct absenc: what was found, on what, and the last exchanges.
+// A report of doctor as one file, for the developers of absenc: versions, adapter, settings, findings, and the last
+// exchanges.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns whether the field is a serial number, which identifies one encoder or interface: its name begins so.
+/// Returns whether the field holds a serial number, which identifies one encoder or interface: the name of such a field
+/// begins with "serial".
 [[nodiscard]] bool is_serial_number(std::string_view field);
 
 /// The last exchanges of an examination, in which serial numbers are masked.
@@ -30,7 +32,8 @@ class ReportedExchanges {
       : unit_(&unit), judge_(unit, options), serial_numbers_(serial_numbers) {}
 
   void add(const DoctorExchange& exchange);
-  /// Returns the exchanges as lines of time in seconds, request, reply, and time of the reply in microseconds.
+  /// Returns a line for each exchange: end of the request in seconds since the first exchange, request, reply, and time
+  /// from the request to the reply in microseconds.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] std::size_t size() const { return lines_.size(); }
   [[nodiscard]] std::size_t masked() const { return masked_; }

@@ -20,7 +20,8 @@ namespace absenc::tool {
 
 namespace {
 
-/// A parser of the words after a verb; it reports a wrong name before a missing parameter.
+/// A parser of the words after a verb. If an option has a wrong name and a parameter is missing, it reports the wrong
+/// name.
 class ArgumentParser {
  public:
   explicit ArgumentParser(const Subcommand& subcommand) : subcommand_(&subcommand) {

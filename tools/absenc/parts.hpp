@@ -18,7 +18,8 @@ inline constexpr std::string_view hdf5_package = "absenc-hdf5";
 /// Returns the path at which the part `name` belongs: lib/absenc/NAME beside the folder of the command.
 [[nodiscard]] std::string path_of_part(std::string_view name);
 
-/// Replaces this process by the program of the verb, with the same words. Throws Failure if it is not installed.
+/// Replaces this process by the program that runs the verb, and passes it the same command-line words. Throws Failure
+/// if the program is not installed.
 [[noreturn]] void start_program(const Subcommand& subcommand, std::span<char* const> words);
 
 /// Loads the plug-in for HDF5, so that recordings can be written with it. Throws Failure if it is not installed or of

@@ -195,7 +195,8 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    // The flags of an encoder with two channels are too long for this line; they are shown among the fields.
+    // The flags of an encoder with two channels are too long for the line of the position; the screen shows them among
+    // the fields.
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
@@ -300,7 +301,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// Draws the last exchanges of the encoder that failed, also those whose request was then repeated with success.
+// Draws the last failed exchanges of the encoder, also those whose request was then repeated with success.
 void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {

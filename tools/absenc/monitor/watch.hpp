@@ -43,10 +43,13 @@ struct Snapshot {
   Time median{};               // median of the times from a request to the end of its reply
   Time percentile_99{};
   Time longest{};
-  // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
+  // Lines of text about the last readings and events, the newest last; empty unless `snapshot` was called with
+  // `details`.
   std::vector<std::string> trace{};
-  std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
-  // Texts "name value" of the fields that are not in the line about the reading; empty unless details were asked for.
+  // last bad exchanges, the newest first; empty unless `snapshot` was called with `details`
+  std::vector<BadExchangeText> bad{};
+  // Texts "name value" of the fields that are not in the line about the reading; empty unless `snapshot` was called
+  // with `details`.
   std::vector<std::string> fields{};
 };
 

@@ -43,7 +43,7 @@ std::string field_words(const capture::Contents& contents) {
   return words;
 }
 
-// Positions of the CSV columns. Those of Behind count from the first column after the columns of the reading.
+// Indexes of the CSV columns. The values of Behind count from the first column after the columns of the reading.
 enum ColumnPosition : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
 enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 

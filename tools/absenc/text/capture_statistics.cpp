@@ -71,7 +71,8 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   error_run_.count = 0;
-  // A frame that is composed of several exchanges repeats a position that was already added.
+  // Leaves out frames that are composed of several exchanges, because their position was already added to the trace
+  // with one of the exchanges.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
 }

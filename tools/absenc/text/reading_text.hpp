@@ -40,7 +40,7 @@ enum class Doubt : std::uint8_t {
 /// Returns the raised alarms in words.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets the JSON keys that state validity and alarms; null means that the encoder does not report it.
+/// Sets the JSON keys that state validity and alarms. A key is null if the encoder does not report its value.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
 /// Returns millimetres as text "0.125", with the decimals (at most 9) that one count of `unit_um` micrometres needs.

@@ -33,10 +33,11 @@ struct Measurement {
   std::uint64_t items = 0;
 };
 
-// Measures for `seconds`. With `rate` 0, each reading begins directly after the previous one.
+// Reads the encoder for `seconds` and measures the readings. With `rate` 0, each reading begins directly after the
+// previous one.
 Measurement measure(Connection& encoder, double seconds, double rate) {
   Measurement measurement;
-  // Memory is reserved before, because allocations during the measurement would disturb the cycle.
+  // Memory is reserved before the measurement, because allocations during it would delay readings.
   const auto expected = static_cast<std::size_t>(std::min(rate * seconds, 1e7));
   measurement.latencies.reserve(expected);
   measurement.deviations.reserve(expected);

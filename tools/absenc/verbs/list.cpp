@@ -49,7 +49,8 @@ std::string section(std::string_view heading, Rows rows) {
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {},
-                                    // The result is not checked, because a model of the unit itself is always valid.
+                                    // The result of `resolve_options` is not checked, because a model of the unit
+                                    // itself is always valid.
                                     options));
   return line_of(unit.link, line_settings(unit, options));
 }

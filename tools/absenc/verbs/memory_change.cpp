@@ -97,7 +97,7 @@ class MemoryWrite {
       return;
     }
     print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
-    // if the user is asked, the question contains the number of differing bytes and the wear
+    // the question to the user already contains the number of differing bytes and the wear of the memory
     if (!asks_) print_note(cost());
   }
 
@@ -127,7 +127,8 @@ class MemoryWrite {
     } catch (const os::Interrupted&) {
       words = "interrupted";
       answer.set("message", words);
-    } catch (const OutputClosed&) {  // the user may not have seen the list of bytes to be written
+    } catch (const OutputClosed&) {
+      // the user may not have seen the list of bytes to be written, or the result
       words = "nobody reads standard output";
     } catch (const EncoderFailure& failure) {
       words = failure.what();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the table of the verb `serve` and the server have in common.
+// The part of the table of the verb `serve` that the server uses, too.
 #pragma once
 
 #include <string_view>
