@@ -67,7 +67,7 @@ struct Burst {
   bool low_after = false;   // the clock rests at its low level after the burst
   // the clock was high at the end of the previous word, and fell during the rest between the two words
   bool fell_before = false;
-  bool has_last = false;  // true: `last` is known
+  bool has_last = false;  // true: the level behind the last clock change, `last`, is known
   // level behind the last clock change, where a host with one clock per bit takes its last bit
   bool last = false;
   // levels of the encoder's data line one, two ... clock periods after `last`, the first as the highest of `tail_bits`
@@ -100,7 +100,7 @@ struct Block {
   Tick end = 0;                       // first tick after the block
   std::vector<std::uint8_t> samples;  // samples, `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // size of a sample in bytes: 1, 2, 4 or 8
-  std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
+  std::vector<Changes> changes;       // for captures of kind changes: the level changes of each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
   // number by which the reader finds the part of the file when `fill` is called, such as an offset
@@ -114,7 +114,7 @@ struct Reader {
   [[nodiscard]] virtual const Layout& layout() const = 0;
   /// Claims the next part of the file, by one thread at a time; returns false if there is none.
   [[nodiscard]] virtual bool claim(Block& block) = 0;
-  /// Reads the part that `claim` put into `block`; threads may fill different blocks at once.
+  /// Reads the part of the file that `claim` has chosen for `block`; threads may fill different blocks at once.
   virtual void fill(Block& block) = 0;
   /// Returns the problems of the file in its order; complete after the last block was filled.
   [[nodiscard]] virtual const std::vector<Damage>& damages() const = 0;

@@ -12,10 +12,10 @@ namespace absenc {
 
 /// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
-  absent,   ///< the reply does not contain this part
-  unknown,  ///< it is not known whether this part is valid: do not use it
-  invalid,  ///< a reported alarm or state marks this part as invalid
-  valid,    ///< every alarm and state that could make this part invalid was reported, and is clear
+  absent,   ///< the reply does not contain this part of the reading
+  unknown,  ///< it is not known whether this part of the reading is valid: do not use it
+  invalid,  ///< a reported alarm or state marks this part of the reading as invalid
+  valid,    ///< every alarm and state that could make this part of the reading invalid was reported, and is clear
 };
 
 /// Returns the low `bits` (1 to 64) of `value` as a signed number in two's complement.
@@ -47,7 +47,7 @@ struct Reading {
   std::uint32_t status_reported = 0;
   /// mask of the bits of `alarms` that the encoder reported; the others are unknown, not clear
   std::uint32_t alarms_reported = 0;
-  /// Time for which the position is taken to hold.
+  /// Point in time at which the shaft is assumed to have had this position.
   Time latched{};
   Time received{};  ///< time at which the last byte of the reply arrived
 

@@ -46,7 +46,8 @@ static_assert(Crc<biss>::table_bytes == 256 && Crc<biss, CrcTable::nibble>::tabl
 static_assert(Crc<modbus>::table_bytes == 512 && Crc<modbus, CrcTable::nibble>::table_bytes == 32);
 static_assert(sizeof(Crc<biss>) == 1 && sizeof(Crc<modbus>) == 2, "the state is the remainder alone");
 
-constexpr std::uint64_t mixed(std::uint64_t x) {  // mixes the bits of the sample's number as splitmix64 does
+// Returns 64 pseudo-random bits for the number `x`, calculated as splitmix64 does.
+constexpr std::uint64_t mixed(std::uint64_t x) {
   x += 0x9E37'79B9'7F4A'7C15;
   x = (x ^ (x >> 30)) * 0xBF58'476D'1CE4'E5B9;
   x = (x ^ (x >> 27)) * 0x94D0'49BB'1331'11EB;
@@ -59,7 +60,8 @@ constexpr auto noise = [] {
   return bytes;
 }();
 
-// Sample 0 has the polynomial x^width + 1, the others have pseudo-random polynomials.
+// Returns the parameters of the CRC with the number `sample` among those that are tested: number 0 has the polynomial
+// x^width + 1, the others have pseudo-random polynomials.
 constexpr CrcParameters sampled(unsigned width, std::uint64_t sample, bool refin, bool refout) {
   const std::uint64_t bits = mixed(width * 64 + sample);
   const std::uint64_t mask = low_mask(width);
@@ -81,8 +83,8 @@ template <CrcParameters parameters>
 constexpr Engines engines{parameters, [](Bytes bytes) -> std::uint16_t { return Crc<parameters>::of(bytes); },
                           [](Bytes bytes) -> std::uint16_t { return Crc<parameters, CrcTable::nibble>::of(bytes); }};
 
-// A refout that differs from refin only changes the last step of the CRC, so one sample for each of these two pairs is
-// enough.
+// If refout differs from refin, only the last step of the CRC changes, so one tested CRC is enough for each of the two
+// combinations in which they differ.
 template <unsigned width>
 constexpr std::array engines_of_width{
     engines<sampled(width, 0, false, false)>, engines<sampled(width, 1, false, false)>,

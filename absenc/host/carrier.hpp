@@ -27,7 +27,7 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    // true, so that no silence is reported until a transfer or pulse was sent, or an item or a line error arrived
+    // no silence is to be reported until a transfer or pulse was sent, or an item or a line error arrived
     silence_reported_ = true;
     take_steps(now);
   }
@@ -183,7 +183,8 @@ class Carrier {
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
   // Members that are used for every received character come first, so that short instructions can address them.
-  std::uint8_t expected_ = 0;  // number of characters to deliver in one piece; below 2: each character at once
+  // number of received characters that are delivered to the machine together; below 2: each character at once
+  std::uint8_t expected_ = 0;
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
   bool sending_ = false;

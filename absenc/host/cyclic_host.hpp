@@ -11,7 +11,7 @@
 
 namespace absenc::host {
 
-/// A command that a CyclicHost runs beside its positions. It must live until it is over.
+/// A command that a CyclicHost runs beside its positions. It must live until it is done or refused.
 template <class Item>
 class Service {
  public:
@@ -19,7 +19,7 @@ class Service {
   enum class State : std::uint8_t {
     waiting,  ///< the conversation has not begun
     running,  ///< the conversation has begun
-    done,     ///< the conversation has ended; its `error()` tells how
+    done,     ///< the conversation has ended, perhaps with an error (Conversation::error)
     refused,  ///< a request does not fit between two positions, and the service may not take cycles
   };
 
@@ -53,7 +53,7 @@ class Service {
 
 /// The times that a CyclicHost keeps, and its line.
 struct CyclePlan {
-  Time period{};        ///< time from one cycle to the next
+  Time period{};  ///< time from one cycle to the next
   /// settings of the line, from which the durations of requests and replies follow; a conversation may set another rate
   LineSettings line{};
   /// longest time from a request to its reply, if shorter than the protocol's limit; 0: the protocol's limit
@@ -91,9 +91,9 @@ struct Cycle {
 ///     cycle begins      reply          service fits?            next cycle
 ///     |--- position ----|--- service's request and reply ---|---|--- position ...
 ///
-/// A service's request is sent only if the longest reply that may follow ends before the next cycle. Services rest as
-/// long as they want while positions are read. If the plan says `carried`, a service's request takes the place of the
-/// position's, and its reply gives both.
+/// A service's request is sent only if the longest reply that may follow ends before the next cycle. While a
+/// service waits between its requests, positions are read. If the plan says `carried`, a service's request takes the
+/// place of the position's, and its reply gives both.
 ///
 /// Item is the link's, `Read` a callable that returns the Conversation of one position each time that it is called; the
 /// conversation is used until the next call. It must end by itself.
@@ -116,8 +116,8 @@ class CyclicHost final : public Machine<Item> {
   [[nodiscard]] const Cycle& cycle() const { return cycle_; }
   /// Returns how many items were received while neither a reading nor a service expected any.
   [[nodiscard]] std::uint32_t unasked() const { return unasked_; }
-  /// Moves the next cycle to `at`, for drives whose PWM begins the cycles; Carrier::wake must follow. A cycle that a
-  /// carried service has begun ahead stays where it is.
+  /// Moves the begin of the next cycle to `at`, for drives whose PWM begins the cycles. Call Carrier::wake afterwards.
+  /// A cycle that a carried service has begun before its time is not moved.
   void begin_next_at(Time at) { due_ = at; }
 
   void feed(const Event<Item>& event) override;
@@ -191,7 +191,8 @@ void CyclicHost<Item, Read>::feed(const Event<Item>& event) {
   }
   if (event.kind == (ends_by_items_ ? Of::received : Of::sent)) in_transfer_ = false;
   if (user_ == User::nobody) unasked_ += static_cast<std::uint32_t>(event.items.size());
-  // Both conversations get every CAN frame, because they recognise theirs by its identifier.
+  // The conversations of the position and of the service both get every CAN frame: each recognises the replies to its
+  // own requests by their identifier.
   const bool is_for_both = is_can && event.kind == Of::received;
   if (user_ == User::position || (is_for_both && position_ != nullptr)) position_->feed(event);
   const bool is_running = service_ != nullptr && service_->state_ == State::running;

@@ -19,8 +19,8 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Runs `conversation`; returns whether it ended within `limit`. A conversation with `asks()` need only emit a
-  /// result.
+  /// Runs `conversation`; returns whether it ended within `limit`. A conversation that sends a request for each result
+  /// of a stream is stopped at its first result, which counts as its end.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;

@@ -128,7 +128,7 @@ RC_GTEST_PROP(UnwrapProperty, JoinsWithinTheLongestGap, ()) {
   if (longest < 0x1p57) RC_ASSERT(!joins(longest * (1 + 0x1p-27) + 2));
 }
 
-// The integers must find the same jumps as the calculation with floating point.
+// Unwrapper, which calculates with integers, must find the same jumps as a calculation with floating point.
 RC_GTEST_PROP(UnwrapProperty, JumpsFromFourTimesTheSpeedLimitOn, ()) {
   const auto bits = *rc::gen::inRange(8u, 64u);
   const auto speed = static_cast<std::uint32_t>(any_number(32));

@@ -78,7 +78,7 @@ class OutstandingRequests {
   void add(Items request, std::size_t expect, Time sent_at);
   /// Marks all requests equal to `request` as lost. The oldest counts as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
-  /// Removes the oldest request with these bytes, because its reply was received.
+  /// Removes the oldest request of `entry`, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }

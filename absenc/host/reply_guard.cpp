@@ -12,11 +12,11 @@ using namespace std::chrono_literals;
 
 // Length of the silence that the function `required_silence` demands on the line, in multiples of the longest timeout.
 constexpr int silent_timeouts = 4;
-// Upper limit of a wait for late replies, unless 3/2 of the expected lateness is longer.
+// Upper limit of a wait for late replies, unless 3/2 of the time expected from a request to its late reply is longer.
 constexpr Time longest_silence = 2500ms;
 // Shortest silence after which replies that a stalled line has delayed count as lost.
 constexpr Time stall_silence = 500ms;
-constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
+constexpr Time longest_lateness = 10s;  // a reply that arrives later than this after its request counts as lost
 // Items that keep arriving for less than this time are not taken for noise.
 constexpr Time least_noise = 100ms;
 constexpr Time tick{1};
@@ -424,8 +424,8 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The reply may answer any of several equal requests; the time since the newest of these requests is the smallest
-    // possible lateness.
+    // The reply may answer any of several equal requests. The shortest possible time from the request to its late reply
+    // is the time since the newest of these requests.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));

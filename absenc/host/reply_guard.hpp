@@ -79,8 +79,9 @@ class ReplyGuard final : public Machine<Item> {
     Report report{};
   };
   struct Delaying {
-    Time until{};            // earliest time at which the delayed request is sent
-    Time received_at{};      // when the last item was received while delaying; if none was, `gap` before delaying began
+    Time until{};  // earliest time at which the delayed request is sent
+    // time at which the last item was received while delaying; if none was, the time `gap` before delaying began
+    Time received_at{};
     Time noise_end = never;  // time at which the request is sent even if items still arrive
   };
   struct Matching {
@@ -157,7 +158,7 @@ class ReplyGuard final : public Machine<Item> {
   OutstandingRequests<Item> outstanding_;
   // Longest time from a request to the `silence` event that showed that its reply is missing.
   Time longest_timeout_{};
-  // Time by which a reply may be late. It is reduced by 1/16 at each end of the phase listening.
+  // Time that is expected from a request to its late reply. It is reduced by 1/16 at each end of the phase listening.
   Time expected_lateness_{};
   Time greatest_lateness_{};
   std::uint64_t late_replies_ = 0;

@@ -140,7 +140,8 @@ class Session {
   /// Sets the filter of later commands, which must outlive the session; null: none. Do not call it while a stream may
   /// continue.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
-  /// Returns ReplyGuard::lateness as of the end of the last command.
+  /// Returns the longest estimated time between a request and its late reply on this line (ReplyGuard::lateness), as of
+  /// the end of the last command.
   [[nodiscard]] Time lateness() const { return lateness_; }
 
   /// Sets the options from the next command on.
@@ -220,7 +221,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // becomes true again below when the conversation has stopped at its next result
+      streaming_ = false;  // stays false if `drive_one` throws: the stream has then ended
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -283,7 +284,7 @@ class Session {
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // Meanwhile the reply guard may have served another encoder on the line.
+    // Since the last result of a stream the reply guard may have served another encoder on the line.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }

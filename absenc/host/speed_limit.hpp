@@ -50,7 +50,7 @@ inline constexpr unsigned most_excess = 4;
 }
 
 /// The distance that a shaft or carriage can move in a given time at its speed limit. All distances are rounded up by
-/// 2^-29 of their value at most, and then down to whole units.
+/// 2^-29 of their value at most, and then down to a whole number.
 class Reach {
  public:
   /// Returns the reach of a shaft of at most `rpm` revolutions per minute.

@@ -141,7 +141,8 @@ class Statistics {
   /// Greatest number of stored failed exchanges; only the last ones are stored.
   static constexpr std::size_t most_stored = 8;
 
-  /// Adds the result of a conversation: its latency, if it has one, or after an error its exchange.
+  /// Adds the result of a conversation. Without an error, the time from its last request to the reply is counted as a
+  /// latency, if it had both; with an error, its last exchange is stored as a failed exchange.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {

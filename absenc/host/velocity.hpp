@@ -29,7 +29,8 @@ struct MilliSpeed {
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
-  /// A window this many times as long as `window` is used even if its speed is less certain.
+  /// The window grows to at most about this many times the desired length `window`. At this length it is used even if
+  /// its speed is less certain.
   static constexpr int longest_windows = 20;
 
   /// Longest duration that can be desired as `window`; a longer one is reduced to it.
@@ -91,10 +92,10 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // A window of positions is certain enough if the position moved by this many counts in it, and if it is this many
-  // times as long as its uncertainty.
+  // A window of positions is certain enough if the position moved by this many counts in it, and if its length is this
+  // many times the uncertainty of this length.
   static constexpr int enough = 20;
-  // The longest window is used already if it is this many times as long as its uncertainty.
+  // A window of the greatest length is used even if its length is only this many times the uncertainty of this length.
   static constexpr int least = 4;
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
@@ -121,7 +122,7 @@ class Velocity {
   // of its value at most.
   [[nodiscard]] static constexpr std::int64_t rate(std::uint64_t counts, Time time, Rounding rounding) {
     const Rounding opposite = rounding == Rounding::up ? Rounding::down : Rounding::up;
-    // the unit is counts per 1000 s, which are 10^12 ns: 5^12 * 2^12
+    // the result is in counts per 1000 s, and 1000 s are 10^12 ns = 5^12 * 2^12 ns
     constexpr std::uint64_t five_to_the_12th = 244'140'625;
     const std::uint64_t carry = rounding == Rounding::up ? 1 : 0;
     if (counts == 0) return 0;

@@ -13,9 +13,10 @@ class Silence {
   /// Makes a timer for a line that has been silent since the time `since`.
   explicit Silence(Time since) : since_(since) {}
 
-  /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
+  /// Records that this end of the line ended a transfer or pulse at `at`. Until an item is received, the limit `answer`
+  /// of the step applies.
   void sent(Time at) { *this = Silence(at); }
-  /// Records a received item: the `gap` limit now applies.
+  /// Records that an item was received at `at`. From now on the limit `gap` of the step applies.
   void received(Time at) {
     busy(at);
     received_ = true;
@@ -31,7 +32,8 @@ class Silence {
   /// Returns whether an item was received since the last transfer or pulse.
   [[nodiscard]] bool has_received() const { return received_; }
 
-  /// Returns when `silence` is due by the limits `answer` and `gap` plus `latency`, or `never`.
+  /// Returns when the event `silence` is due: after a silence of `answer`, or of `gap` if an item was received since
+  /// the last transfer or pulse, plus `latency`. Returns `never` if the event was reported already or the limit is 0.
   [[nodiscard]] Time due(Time answer, Time gap, Time latency = {}) const {
     const Time limit = received_ ? gap : answer;
     return reported_ || limit <= Time{} ? never : since_ + limit + latency;

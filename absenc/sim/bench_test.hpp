@@ -70,7 +70,7 @@ class RawHost : public Machine<std::uint8_t> {
   bool done_ = false;
 };
 
-/// Returns fault rates of replies: `share` for corrupt ones, a fifth of that for other faults.
+/// Returns the probabilities of faults in replies: `share` for flipped bits, a fifth of `share` for each other fault.
 inline FaultRates damaged_replies(double share) {
   FaultRates rates;
   for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,

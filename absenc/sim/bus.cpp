@@ -8,7 +8,8 @@ namespace absenc::sim {
 
 namespace {
 
-// A transfer is given to the port at most this time before it begins, because it then blocks other devices.
+// The transfer of a device is given to the port at most this time before it begins, because until its end no other
+// device can begin a transfer.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.

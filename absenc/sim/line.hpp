@@ -44,7 +44,7 @@ class Line {
     Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
     /// Bidirectional clocked: number of bits in `out`; those in `in` follow them.
     std::size_t out_bits = 0;
-    /// Bidirectional clocked: end of the transfer before, from which on the clock line rests low; never: it rested
+    /// Bidirectional clocked: end of the previous transfer, from which on the clock line rests low; never: it rested
     /// high.
     Time goes_on_from = never;
     bool goes_on = false;  ///< bidirectional clocked: the clock line rests low behind the transfer

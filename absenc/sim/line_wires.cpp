@@ -164,7 +164,7 @@ void Line<Item>::begin_transfer(Node node) {
   schedule(ScheduledEvent::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
 }
 
-// Passes the bits of the host on to the devices, whose next bits follow them.
+// Passes the bits that the host has sent on to the devices. The next bits that a device sends follow them on the line.
 template <class Item>
 void Line<Item>::turn_data_line(Node node) {
   const State& host = *nodes_[node];

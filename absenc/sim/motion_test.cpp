@@ -89,7 +89,7 @@ TEST(Motion, DerivativesAgreeWithPositions) {
       const double rpm = (after - before) / static_cast<double>(revolution) / 10e-6 * 60;
       EXPECT_NEAR(motion.at(time).speed_millirpm, rpm * 1e3, 2);
       const double radians = (after - 2 * here + before) / static_cast<double>(revolution) * 6.283185307;
-      // Rounding of the positions changes the second difference by up to 2 units, which are 117 rad/s^2.
+      // Rounding changes the second difference of the positions by up to 2 * 2^-32 revolution, which is 117 rad/s^2.
       EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);
     }
   }

@@ -13,7 +13,7 @@ namespace absenc::sim {
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
   const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
   if (bits == 0) return 0;
-  // If the encoder has more than 32 bits, those finer than 2^-32 revolution are 0.
+  // If the encoder has more than 32 bits, the bits that are finer than 2^-32 revolution are 0.
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 

@@ -120,7 +120,7 @@ void SimPort<Item>::advance(const Step<Item>& step) {
 template <class Item>
 template <class Done>
 void SimPort<Item>::run_until(const Done& done) {
-  // Sleep while the line has no event; short, because `sleep_until` may throw to end the wait.
+  // Duration of one sleep while the line has no event. It is short, because `sleep_until` may throw to end the wait.
   constexpr Time idle = std::chrono::milliseconds(100);
   while (!done()) {
     const Time due = line_.next_event();

@@ -105,7 +105,8 @@ class Waveform {
   LineSettings settings_;
   Sink* sink_;
   std::vector<Wire> wires_;
-  std::vector<int> drivers_;  // for each wire, the number of drives that hold it away from its idle level at present
+  // for each wire, the number of calls of `drive` whose time includes the present: 0 means the idle level
+  std::vector<int> drivers_;
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time

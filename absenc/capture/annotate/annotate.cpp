@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splits the characters of a capture into runs, and finds which channel carries the requests.
+// Splits the characters of a capture at the pauses of the line, and finds which channel carries the requests.
 #include "absenc/capture/annotate/annotate.hpp"
 
 #include <algorithm>
@@ -105,7 +105,8 @@ bool Annotator::ends_with_request(const Channel& channel) {
   return false;
 }
 
-// Returns whether the silence between the last character of a run and a character at `begin` ends the run.
+// Returns whether the silence between the last character of `channel` and a next one at `begin` is a pause, which
+// separates frames.
 bool Annotator::is_over(const Channel& channel, Tick begin) {
   if (channel.run.empty()) return false;
   const Tick end = channel.run.end();
@@ -149,7 +150,7 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // Without a pause before this run, the borders of its frames are unknown: all of it is reported as noise.
+  // No pause was seen before these characters, so the borders of their frames are unknown: all are reported as noise.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};

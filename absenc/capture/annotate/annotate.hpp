@@ -23,7 +23,8 @@ enum class Carries : std::uint8_t {
   detect,  // not known yet: to be detected from the characters of both channels
 };
 
-/// Returns the times of the unit's line in ticks of a capture. An argument of 0 means that this number is not known.
+/// Returns the time limits for the line of `unit` in ticks of a capture. If `ticks_per_bit` is 0 (not known), these are
+/// the defaults of LineTicks; if `ticks_per_second` is 0 (not known), the unit's usual bit rate is assumed.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
 /// Converts characters to annotated exchanges. Memory does not grow with the length of the capture. Some replies equal
@@ -42,7 +43,7 @@ class Annotator {
     Tick gap = 1;
   };
 
-  /// Makes an annotator for `unit`, which must outlive it like `sink`.
+  /// Makes an annotator for captures of `unit`. `unit` and `sink` must outlive the annotator.
   Annotator(const Unit& unit, const Options& options, const Settings& settings, AnnotationSink& sink);
   Annotator(const Annotator&) = delete;
   Annotator& operator=(const Annotator&) = delete;
@@ -63,20 +64,22 @@ class Annotator {
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    // false: no pause was seen yet, so the first run may begin within a frame and is reported as cut (unused with
-    // arrival times)
+    // false: no pause was seen on this channel yet, so the characters before the first pause may begin within a frame,
+    // and are reported as noise with Remark::cut (unused with arrival times)
     bool synchronised = false;
     bool at_frame_start = false;  // true: the next character to parse is taken as the begin of a frame
-    // size of the last good unsolicited frame of this run; with arrival times a reply sets it to 0
+    // size in bytes of the last good unsolicited frame since the last pause, 0 if there was none; with arrival times a
+    // reply to a request sets it to 0
     std::size_t last_size = 0;
-    std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none
+    // size in bytes of the last good unsolicited frame of this channel, even before the last pause; 0: none
+    std::size_t stream_size = 0;
   };
 
-  // These functions find which channel carries requests and which carries replies.
+  // The functions `store_undecided` and `find_roles` find which channel carries requests and which carries replies.
   void store_undecided(const Character& character);
   void find_roles();
 
-  // These functions split the characters into runs.
+  // The functions from `take` to `parse` split the characters of each channel at the pauses of the line.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   [[nodiscard]] bool ends_with_request(const Channel& channel);
@@ -84,7 +87,8 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // These functions parse the run from index `at_` on. They return the size of what they found, 0 if nothing matches.
+  // The functions from `next_frame` to `report_bad` parse the characters between two pauses from index `at_` on. A size
+  // that they return is that of the bytes that they found, 0 if nothing matches.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -125,13 +129,13 @@ class Annotator {
 
   bool is_first_ = true;  // no frame was parsed yet: the capture may have begun within a frame or exchange
 
-  // The following members are the state while a run is parsed.
+  // The members from here to the end are the state while the characters between two pauses are parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
-  bool whole_ = true;  // true: no further characters will be added to the run
-  bool cut_ = false;   // true: the capture ends without a pause behind this run, so perhaps within a frame
+  bool whole_ = true;  // true: no further characters will be added to those that are parsed
+  bool cut_ = false;   // true: the capture ends without a pause behind its last character, so perhaps within a frame
   std::size_t last_reply_at_ = 0;
-  std::size_t last_reply_size_ = 0;  // size of the last reply of this run; 0: there is none
+  std::size_t last_reply_size_ = 0;  // size in bytes of the last reply since the last pause; 0: there is none
 };
 
 }  // namespace absenc::capture

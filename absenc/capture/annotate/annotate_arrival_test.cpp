@@ -129,7 +129,8 @@ TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
     const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
     receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
     at += size;
-    now += random.below(10) == 0 ? 5 * gap : 1;  // a pause of 5 * gap follows one piece in ten, often within a frame
+    // one in ten of the groups of bytes that arrive together is followed by a pause of 5 * gap, often within a frame
+    now += random.below(10) == 0 ? 5 * gap : 1;
   }
   annotator->report_after_silence();
   EXPECT_EQ(difference(good(), exchanges), "");
@@ -149,7 +150,7 @@ TEST_P(Arrival, ReportsExchangeWhenComplete) {
     late += good().size() <= i ? 1u : 0u;
   }
   EXPECT_EQ(difference(good(), exchanges), "");
-  // a reply shorter than the previous reply to the same command may be reported late
+  // a reply that is shorter than the previous reply to the same command may be reported only when more bytes arrive
   EXPECT_LE(late, exchanges.size() / 20);
 }
 

@@ -162,7 +162,8 @@ bool bit_of(const std::vector<std::uint8_t>& bytes, std::size_t bit) {
 
 }  // namespace
 
-// The first sample of a burst is the idle level before the first clock; the last bits follow behind the last one.
+// The first sample of a burst is the idle level before the first clock; the last bits (`last` and `tail`) are sampled
+// behind the last clock.
 void BurstAnnotator::decode_both_ways(const Burst& burst, Annotation& annotation) {
   annotation.kind = Annotation::Kind::exchange;
   line_.clear();
@@ -192,8 +193,9 @@ void BurstAnnotator::decode_both_ways(const Burst& burst, Annotation& annotation
   annotation.error = judge_.decode(annotation.request, annotation.reply);
 }
 
-// Replaces the bits of the host by those of its own wire. Without a direction wire the unit tells which these are:
-// first by the host's wire alone, on which the mode command is, then by both.
+// Replaces the bits in `line_` that the host has sent by the bits of the host's own wire. The direction wire shows
+// which bits the host has sent. Without that wire the unit finds them: first from the host's wire alone, which carries
+// the mode command, then from the bits of both wires.
 void BurstAnnotator::take_host_wire(const Burst& burst, std::size_t bits) {
   if (!burst.direction.empty()) {
     for (std::size_t i = 0; i < bits; ++i) {

@@ -63,7 +63,7 @@ class ControlFrames {
 /// Annotates SPI exchanges and clocked words, and the control frames that clocked words carry.
 class BurstAnnotator {
  public:
-  /// Makes an annotator for `unit`, which must outlive it like `sink`.
+  /// Makes an annotator for captures of `unit`. `unit` and `sink` must outlive the annotator.
   BurstAnnotator(const Unit& unit, const Options& options, AnnotationSink& sink) : judge_(unit, options), sink_(sink) {}
 
   void put(const Burst& burst);
@@ -80,7 +80,7 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  // storage of bits in both directions, of those of the host, and of those of the encoder
+  // all bits of a burst (`line_`), those that the host has sent, and those that the encoder has sent
   std::vector<std::uint8_t> line_;
   std::vector<std::uint8_t> request_;
   std::vector<std::uint8_t> reply_;

@@ -64,7 +64,8 @@ void annotate(const Unit& unit, const Options& options, Annotator::Settings sett
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Bytes bytes(data, size);
-  // selects the kind of line by the size and first byte of the input, and anew for each unit
+  // number that selects whether the line carries requests, replies or both; from the size and the first byte of the
+  // input, and another one for each unit
   std::size_t turn = size + data[0];
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;

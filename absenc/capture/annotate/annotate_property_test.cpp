@@ -86,7 +86,8 @@ class Truth {
       }
     }
   }
-  // Adds a burst of a line whose data turns: the unit tells which bits are the host's.
+  // Adds the annotation that is expected for a burst on a bidirectional link; `unit` tells which bits the host has
+  // sent.
   void add_both_ways(const Burst& burst, const Unit& unit, const Options& options) {
     std::vector<bool> bits;
     for (std::size_t i = 1; i < burst.bits; ++i) bits.push_back((burst.in[i / 8] >> (7 - i % 8) & 1) != 0);
@@ -251,7 +252,8 @@ class Truth {
 
 // ---- Comparison of found and expected annotations
 
-// Only a `share` of the bad exchanges must match exactly, because several faults together may look like another fault.
+// Requires that `found` equals `expected`. Of the bad exchanges only a `share` (0 to 1) must match exactly, because
+// several faults together may look like another fault.
 void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
                  double share = 1) {
   std::size_t next = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splits runs of characters into frames: finds requests, replies, and the extent of bytes that are neither.
+// Splits the characters between two pauses into frames: finds requests, replies, and the extent of bytes that are
+// neither.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -151,7 +152,7 @@ bool Annotator::is_followed_by_frame(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// Returns whether the characters from index `from` to the end of the run are the encoder's refusal of `request`.
+// Returns whether all characters from index `from` to the next pause are the encoder's refusal of `request`.
 bool Annotator::is_refusal(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   return channel_->run.clean(from, bytes.size()) &&
@@ -258,7 +259,7 @@ std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
   report_bad(size);
   last_reply_size_ = 0;
-  channel_->at_frame_start = true;  // bad bytes mostly end where a good frame begins, or where the run ends
+  channel_->at_frame_start = true;  // bad bytes mostly end where a good frame begins, or at the next pause
   if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
@@ -268,11 +269,11 @@ std::size_t Annotator::bad_size() {
   // In a stream of unsolicited frames a bad frame mostly has the size of the good frames.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // If the run ends with a good unsolicited frame, all bytes before this frame are the bad ones.
+  // If a good unsolicited frame ends at the next pause, all bytes before this frame are the bad ones.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;
-  // Returns whether exactly one good request follows `size` bad bytes and ends with the run.
+  // Returns whether exactly one good request follows `size` bad bytes and ends at the next pause.
   const auto ends_before_request = [&](std::size_t size) {
     return size != 0 && size < left && request_at(at_ + size) == left - size;
   };

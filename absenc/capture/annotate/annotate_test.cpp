@@ -115,7 +115,8 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   settings.ticks = {.pause = length / 2, .character = length};
   for (std::size_t from = 0; from < 2 * sizes[0]; ++from) {
     std::vector<Character> seen(characters.begin() + static_cast<std::ptrdiff_t>(from), characters.end());
-    // more characters than a run can hold, because only then the annotator knows that the line never pauses
+    // more characters without a pause than a Run can hold, because only then the annotator knows that the line never
+    // pauses
     while (seen.size() <= Run::capacity) {
       const Tick behind = seen.back().end - characters.front().begin;
       for (Character character : characters) {

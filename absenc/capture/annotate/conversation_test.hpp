@@ -100,7 +100,8 @@ class Talker {
     return std::move(record_);
   }
 
-  /// Draws all items that host and encoder send from now on to `waveform`, which must outlive this object.
+  /// Draws in `waveform` all bytes (on clocked links: bits) that host and encoder send from now on. `waveform` must
+  /// outlive this object.
   void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
 
   [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }

@@ -97,7 +97,7 @@ std::string seconds(Tick time) {
   return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
 }
 
-/// The samples of a drawing, computed piece by piece.
+/// The samples of a drawing in the order of time; each call of `fill` computes the next ones.
 class Samples {
  public:
   Samples(Drawing& drawing, std::uint64_t rate)
@@ -260,7 +260,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
   archive.add("metadata", metadata(drawing, rate, samples.size));
 
   constexpr std::uint64_t samples_a_part = 4 << 20;
-  std::vector<std::uint8_t> bytes(1 << 16);  // a multiple of each size of a sample
+  std::vector<std::uint8_t> bytes(1 << 16);  // buffer; a sample has 1, 2, 4 ... bytes, so whole samples fill the buffer
   unsigned part = 0;
   for (std::uint64_t first = 0; first < samples.count; first += samples_a_part) {
     archive.begin("logic-1-" + std::to_string(++part));

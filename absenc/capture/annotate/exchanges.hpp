@@ -17,8 +17,8 @@ namespace absenc::capture {
 struct LineTicks {
   static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; adding times to it cannot overflow
 
-  Tick pause = 1;        // a silence shorter than this, in ticks, does not end a run of characters
-  Tick frame_pause = 0;  // a silence shorter than this ends a run only after a complete request; 0: unused
+  Tick pause = 1;        // shortest silence between two characters that can be a pause between frames, in ticks
+  Tick frame_pause = 0;  // a silence shorter than this is a pause only behind a complete request, in ticks; 0: unused
   Tick character = 1;    // duration of a character; a silence between the edges of one character is shorter
   Tick turnaround = 0;   // turnaround time that the unit's document states; 0: not known
   Tick limit = never;    // longest time from request to reply; after it no host expects the reply
@@ -43,7 +43,8 @@ class Exchanges {
     Tick end = 0;
     Error error = Error::none;
     Remark remark = Remark::none;
-    // true: a request; false: bytes that are no frame, on a line with both directions; a reply may follow
+    // true: the stored bytes are a request; false: they are no frame, but a reply may follow them, because the line
+    // carries both directions
     bool is_request = true;
 
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }

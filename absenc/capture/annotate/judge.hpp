@@ -30,7 +30,8 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// Decodes a request and its reply, stores what `contents` returns, and returns the error of decoding.
+  /// Decodes a request and its reply, and returns the error of decoding. Afterwards `contents` returns the decoded
+  /// fields and reading, which are empty after an error.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
     const Error error = decoder_ != nullptr ? decoder_->decode(request, reply, decoded_)

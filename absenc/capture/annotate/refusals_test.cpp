@@ -25,7 +25,8 @@ Wire joined(const Wire& first, const Wire& second) {
   return both;
 }
 
-/// Checks that `runs`, placed between two good exchanges, are annotated as one request that the encoder refused.
+/// Checks that the bytes in `runs`, each followed by a pause, are annotated as one request that the encoder refused.
+/// They are sent between two good exchanges.
 void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
   std::vector<Wire> all{request, reply};
   all.insert(all.end(), runs.begin(), runs.end());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run: consecutive characters of one channel.
+// A run: consecutive characters of one channel without a pause between them; of bytes with arrival times, all that are
+// not parsed yet.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +27,7 @@ class Run {
     ++size_;
   }
 
-  /// Removes the first `count` characters.
+  /// Removes the first `count` characters of the run.
   void drop(std::size_t count) {
     const auto keep = [&](auto& items) {
       std::copy(items.begin() + static_cast<std::ptrdiff_t>(count), items.begin() + static_cast<std::ptrdiff_t>(size_),
@@ -52,7 +53,7 @@ class Run {
   [[nodiscard]] Tick end(std::size_t index) const { return ends_[index]; }
   [[nodiscard]] Tick end() const { return ends_[size_ - 1]; }
 
-  /// Returns whether none of the `count` characters from `first` on is damaged.
+  /// Returns whether none of the `count` characters of the run from index `first` on is damaged.
   [[nodiscard]] bool clean(std::size_t first, std::size_t count) const {
     if (damages_ == 0) return true;
     const auto from = damaged_.begin() + static_cast<std::ptrdiff_t>(first);

@@ -112,7 +112,8 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Requires that `reader` gives the expected annotations, with begin times that differ by at most one bit.
+  // Requires that `reader` gives the expected annotations. Their begin times may differ from the expected ones by the
+  // duration of one bit.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;
@@ -133,7 +134,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
 
 TEST_P(WholeWay, EqualsDirectAnnotation) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
-  // delayed and repeated replies would make host and encoder send at once
+  // during a delayed or repeated reply the host would send its next request
   faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;
   faults.character_bytes = static_cast<std::uint8_t>(line.character_bytes());
   Talker talker(unit, options, faults, 7);

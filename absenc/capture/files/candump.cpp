@@ -114,7 +114,8 @@ class CandumpReader final : public ParsedReader {
   }
 
  private:
-  // Finds the interfaces and the kind of the times in the first 64 KiB.
+  // Finds in the first 64 KiB of the file the names of the interfaces, and whether each time counts from the previous
+  // frame.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
@@ -130,7 +131,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // If all times are of one clock, only frames of different interfaces may have the same time.
+      // If no time counts from the previous frame, only frames of different interfaces may have the same time.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {

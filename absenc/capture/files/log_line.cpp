@@ -355,7 +355,7 @@ class Prefix {
     return false;
   }
 
-  // Handles text in brackets; returns true if the line is complete.
+  // Handles text in brackets; returns true if it contains the bytes with which the line ends.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);

@@ -47,7 +47,8 @@ inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, s
 
 class MemoryReader final : public Reader {
  public:
-  /// Makes a reader that returns blocks of random sizes up to `most` ticks. `leave_out` sets ticks that it skips.
+  /// Makes a reader that returns blocks of random sizes up to `most` ticks. Ticks that are given to `leave_out` are in
+  /// no block, like a gap in a capture.
   MemoryReader(const Wires& wires, Content content, std::size_t most, std::uint64_t seed)
       : wires_(wires), most_(most), random_(seed) {
     layout_.content = content;

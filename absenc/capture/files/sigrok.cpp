@@ -23,8 +23,9 @@ namespace absenc::capture {
 
 namespace {
 
-// size in bytes up to which a piece is expanded as a whole; each thread needs that much memory
-constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
+// Size in bytes up to which a piece (an archive entry with samples) is expanded as a whole; each thread needs that much
+// memory. sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB.
+constexpr std::uint64_t largest_piece = 1 << 24;
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
 // limit for the number of bytes of a capture; only a damaged file can state more
@@ -118,7 +119,7 @@ class SigrokReader final : public Reader {
   }
 
   void fill(Block& block) override {
-    if (block.file_size == 0) return;  // the block is a part of a large piece, which `claim` has already read
+    if (block.file_size == 0) return;  // a block of a large archive entry: `claim` has already read its samples
     const auto index = static_cast<std::size_t>(block.file_offset);
     const SamplePiece& piece = pieces_[index];
     const auto size = static_cast<std::size_t>(piece.entry.size);
@@ -136,7 +137,8 @@ class SigrokReader final : public Reader {
     if (whole) {
       count += read_tail(*archive, index, into.subspan(size, piece.tail));
     } else if (!ends_at_cut(piece, archive.get())) {
-      count = 0;  // a wrong checksum does not show which samples are wrong, so all samples of the piece are dropped
+      // a wrong checksum does not show which samples are wrong, so all samples of the archive entry are dropped
+      count = 0;
       report(piece, block.first, archive.get());
     }
     count -= std::min<std::size_t>(count, piece.skip);
@@ -151,10 +153,10 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
-    // Number of bytes at the beginning of this piece that belong to the last sample of the previous piece, because
-    // sigrok may split a sample between two pieces.
+    // Number of bytes at the beginning of this piece (an archive entry) that belong to the last sample of the previous
+    // piece, because sigrok may split a sample between two pieces.
     unsigned skip = 0;
-    unsigned tail = 0;  // number of bytes of this piece's last sample that are in the next piece
+    unsigned tail = 0;  // number of bytes of this piece's last sample that are in the next piece (archive entry)
   };
 
   // Opens the session as a zip archive; a file that lost the directory at its end gets a new one.
@@ -226,7 +228,8 @@ class SigrokReader final : public Reader {
     return numbers;
   }
 
-  // Leaves a gap for missing pieces; returns the number of sample bytes before the piece `next`.
+  // Leaves a gap for missing pieces (archive entries with samples). Returns the number of sample bytes before the piece
+  // `next`, if each missing piece was as long as one beside them.
   std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
                           std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
     ZipArchive::Entry neighbour;
@@ -279,7 +282,7 @@ class SigrokReader final : public Reader {
     if (has_lost_entries()) {
       last.tail = 0;
       if (std::any_of(pieces_.begin(), pieces_.end(), [&](const SamplePiece& piece) { return is_cut(piece); })) {
-        layout_.ticks = 0;  // the length of a capture with a cut piece is known only after reading
+        layout_.ticks = 0;  // the file is cut off within samples: the length of the capture is known only after reading
       } else {
         damages_.add({.offset = cut_->end,
                       .tick = layout_.ticks,
@@ -301,7 +304,7 @@ class SigrokReader final : public Reader {
 
   [[nodiscard]] bool is_cut(const SamplePiece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
-  // Returns whether the data of a piece ended because the file is cut off within it.
+  // Returns whether the samples of an archive entry ended because the file is cut off within this entry.
   [[nodiscard]] bool ends_at_cut(const SamplePiece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
@@ -312,7 +315,8 @@ class SigrokReader final : public Reader {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
 
-  // Reads the part of a piece's last sample that is in the next piece; may return fewer bytes.
+  // Reads the bytes of a piece's last sample that are in the next piece (archive entry). Returns their number, which
+  // may be lower than the size of `into`.
   [[nodiscard]] std::size_t read_tail(ZipArchive& archive, std::size_t index, std::span<std::uint8_t> into) const {
     return into.empty() || !archive.open(pieces_[index + 1].entry) ? 0 : archive.read(into);
   }
@@ -345,7 +349,7 @@ class SigrokReader final : public Reader {
     return_handle(std::move(stream_));
   }
 
-  // Reads the next part of a large piece into `block`.
+  // Reads the next samples of a large archive entry into `block`.
   void claim_streamed(Block& block) {
     const SamplePiece& piece = pieces_[next_ - 1];
     const auto wanted = static_cast<std::size_t>(std::min(stream_left_, streamed_bytes / unit_size_ * unit_size_));
@@ -385,7 +389,7 @@ class SigrokReader final : public Reader {
                           copy_again});
   }
 
-  // Returns a handle that no other thread uses; null if none can be opened.
+  // Returns an open ZipArchive of the file that no other thread uses; null if the file cannot be opened again.
   std::unique_ptr<ZipArchive> take_handle() {
     {
       const std::lock_guard lock(mutex_);
@@ -417,7 +421,8 @@ class SigrokReader final : public Reader {
   unsigned bytes_per_sample_ = 1;
   std::size_t next_ = 0;
   std::uint64_t index_ = 0;
-  std::unique_ptr<ZipArchive> stream_;  // the large piece that is being read in parts; null: none
+  // open archive from which a large entry is being read in parts; null: none is read so
+  std::unique_ptr<ZipArchive> stream_;
   Tick stream_tick_ = 0;
   std::uint64_t stream_left_ = 0;
   Layout layout_;

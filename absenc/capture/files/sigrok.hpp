@@ -15,7 +15,8 @@ namespace absenc::capture {
 [[nodiscard]] bool is_zip(std::string_view head);
 
 /// Reads sessions of versions 1 and 2 with up to 64 logic channels. Without a rate in the file, `samples_per_second` is
-/// used. Damaged pieces are left out or cut short; later ones keep their times. Throws OpenError.
+/// used. The samples of a damaged archive entry are left out, all or in part; later samples keep their times. Throws
+/// OpenError.
 [[nodiscard]] std::unique_ptr<Reader> read_sigrok(std::unique_ptr<Source> source, std::string_view name,
                                                   std::uint64_t samples_per_second);
 

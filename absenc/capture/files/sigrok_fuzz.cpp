@@ -16,7 +16,7 @@ FileBytes session(const FileBytes& metadata, const FileBytes& samples, bool defl
                   deflate);
 }
 
-// Returns the file of a session that is cut off within its last piece.
+// Returns the file of a session that is cut off within its last archive entry.
 FileBytes cut_off(FileBytes file) {
   constexpr std::string_view directory = "PK\x01\x02";
   file.erase(std::search(file.begin(), file.end(), directory.begin(), directory.end()) - 5, file.end());

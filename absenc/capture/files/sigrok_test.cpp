@@ -79,7 +79,8 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  // The only piece of the first session is read as one block; the piece of the second session is read in parts.
+  // Each session has one archive entry with samples. That of the first session is read as one block, that of the second
+  // session, which is larger, in parts.
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
@@ -134,7 +135,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
-  // Each time another byte in the second of three pieces is changed.
+  // In each round another byte in the second of three archive entries with samples is changed.
   const std::string_view name = "logic-1-2";
   const auto local = std::search(good.begin(), good.end(), name.begin(), name.end());
   const auto begin = static_cast<std::size_t>(local - good.begin());
@@ -183,10 +184,10 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    // the archive contains the name of the piece twice: in front of the piece and in the directory
+    // the archive contains the name of an entry twice: in front of the entry's data and in the directory
     constexpr std::string_view name = "logic-1-7";
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
-    *(in_directory - 30) ^= 1;  // changes a byte of the piece's checksum
+    *(in_directory - 30) ^= 1;  // changes a byte of the entry's checksum
     const auto reader = open_bytes(file);
     FileBytes expected;
     for (int i = 0; i < 11; ++i) expected.insert(expected.end(), samples.begin(), samples.end());
@@ -246,9 +247,9 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
-      if (size < first + 39) {  // the file is cut off before the samples of the first piece
+      if (size < first + 39) {  // the file is cut off before the first samples
         const std::string why = problem(file);
-        // The deflated data of these entries is complete even without its last byte.
+        // The deflated data of the entries `version` and `metadata` is complete even without its last byte.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -342,7 +343,8 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  // the first piece has 333 whole samples and one byte of the next sample, which is lost
+  // the first archive entry has 333 whole samples and one byte of the next sample; without its two other bytes this
+  // sample is lost
   EXPECT_EQ(count(second - 40), 333u);
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);

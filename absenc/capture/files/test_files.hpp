@@ -47,7 +47,8 @@ inline void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-/// Reads a capture to its end and returns its contents; aborts if the reader breaks its rules.
+/// Reads a capture to its end and returns its contents. Aborts if the reader breaks a rule of Reader, for example if
+/// the times of a block are not in order.
 inline CaptureContents read_all(Reader& reader) {
   CaptureContents all;
   Block block;
@@ -113,7 +114,7 @@ inline FileBytes read_in_threads(Reader& reader) {
   return all;
 }
 
-/// Returns a zip archive with these entries, compressed by `method` of libzip.
+/// Returns a zip archive with the given entries, compressed by `method` of libzip.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, zip_int32_t method) {
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, nullptr);
   zip_source_keep(target);

@@ -30,7 +30,7 @@ TEST(TextWords, AreTheSameAsOneCharacterAfterTheOther) {
   const std::string characters = " \t\n\v\f\r!#0~\x01\x1F\x7F\x80\xA0\xFF";
   std::mt19937 random(3);
   for (unsigned round = 0; round < 300; ++round) {
-    // on average one character in `rare`, 1 to 40, may be a blank
+    // on average one character in `rare` (1 to 40) is chosen so that it may be a blank, the others are no blanks
     const auto rare = 1 + random() % 40;
     std::string text(random() % 3000, ' ');
     for (char& c : text) c = characters[(random() % rare == 0 ? 0 : 6) + random() % (characters.size() - 6)];

@@ -26,8 +26,9 @@ constexpr std::size_t end_bytes = 22;
 constexpr std::size_t longest_comment = 0xFFFF;
 constexpr std::uint64_t stored = 0;
 constexpr std::uint64_t deflated = 8;
-constexpr std::uint64_t is_encrypted = 1;       // flag of an entry
-constexpr std::size_t longest_piece = 1 << 28;  // of the directory, in bytes
+constexpr std::uint64_t is_encrypted = 1;  // flag of an entry: its data is encrypted
+// greatest number of bytes that are read from the file at once, for example the directory
+constexpr std::size_t longest_piece = 1 << 28;
 
 struct DirectoryEntry {
   std::string name;
@@ -36,7 +37,7 @@ struct DirectoryEntry {
   std::uint64_t crc = 0;
   std::uint64_t packed = 0;
   std::uint64_t size = 0;
-  std::uint64_t at = 0;  // offset of the local header
+  std::uint64_t at = 0;  // offset in the file of the entry's local header
 };
 
 // Replaces fields of the entry that are in the zip64 extra field, in their order.
@@ -138,10 +139,10 @@ struct ZipArchive::State {
 
   // the entry that is being read
   const DirectoryEntry* entry = nullptr;
-  std::unique_ptr<z_stream, Free> stream;  // null: the entry is stored
+  std::unique_ptr<z_stream, Free> stream;  // null: the data of the entry is not compressed
   std::array<std::uint8_t, 1 << 16> buffer{};
-  std::uint64_t next = 0;  // offset in the file of the bytes that were not taken into `buffer` yet
-  std::uint64_t left = 0;  // number of these bytes
+  std::uint64_t next = 0;  // offset in the file of the entry's bytes that were not taken into `buffer` yet
+  std::uint64_t left = 0;  // number of the entry's bytes that were not taken into `buffer` yet
   std::uint64_t given = 0;
   std::uint32_t crc = 0;
   bool ended = false;  // whether all data of the entry was expanded
@@ -294,7 +295,8 @@ bool ZipArchive::at_good_end() {
   while (!state.ended) {
     const std::size_t got = state.expand_some(more);
     if (got == 0 && !state.ended && !state.ran_out) return false;
-    if (got == 0) break;  // size and checksum decide also where only the mark at the end of the data is cut off
+    // if the mark at the end of the compressed data is cut off, size and checksum decide whether the data is good
+    if (got == 0) break;
     state.problem = "it is longer than the archive says";
     return false;
   }

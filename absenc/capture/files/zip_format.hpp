@@ -18,7 +18,7 @@ constexpr std::uint64_t end_signature = 0x06054B50;
 constexpr std::size_t local_bytes = 30;
 constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size field if the real size is in the zip64 extra field
 
-/// Returns the number of `size` bytes at offset `at`.
+/// Returns the number that `size` bytes (1 to 8) from offset `at` on contain, least significant byte first.
 [[nodiscard]] inline std::uint64_t number(Bytes bytes, std::size_t at, std::size_t size) {
   return load_little_endian(bytes.subspan(at, size));
 }

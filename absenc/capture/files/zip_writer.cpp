@@ -40,7 +40,7 @@ void ZipWriter::end_entry() {
 void ZipWriter::begin(const std::string& name) {
   end_entry();
   zip_fileinfo info{};
-  info.dosDate = 0x0021'0000;  // 1980-01-01: the same content is always the same archive
+  info.dosDate = 0x0021'0000;  // 1980-01-01: a fixed date, so that the same content always gives the same archive
   constexpr int fast = 1;
   if (zipOpenNewFileInZip64(archive_.get(), name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, Z_DEFLATED, fast,
                             0) != ZIP_OK) {
@@ -50,7 +50,7 @@ void ZipWriter::begin(const std::string& name) {
 }
 
 void ZipWriter::write(std::span<const std::uint8_t> bytes) {
-  constexpr std::size_t most = 1 << 30;  // zlib counts in an unsigned int
+  constexpr std::size_t most = 1 << 30;  // zlib counts bytes in an unsigned int, so long data is written in parts
   errno = 0;
   while (!bytes.empty()) {
     const std::size_t size = std::min(bytes.size(), most);

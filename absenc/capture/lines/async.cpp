@@ -15,7 +15,8 @@ constexpr Tick never = std::numeric_limits<Tick>::max();
 constexpr Tick characters_ahead = 12;  // number of characters that are examined to find the first start bit
 // number of falling edges that are tried as the first start bit; more than these within one character are noise
 constexpr std::size_t candidates = 16;
-// number of changes after which the true decoder state is compared again with that of the guess
+// number of level changes after which `meet` again compares the characters found with those of a decoder that began in
+// a guessed state
 constexpr std::size_t step = 64;
 
 }  // namespace
@@ -245,8 +246,8 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // The errors that `other` counted before both decoders met are wrong: a decoder counts them again, and they are
-  // subtracted.
+  // The errors that `other`, which began in a guessed state, counted before it met this decoder are wrong: a decoder
+  // that begins in the same state counts them again, and they are subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

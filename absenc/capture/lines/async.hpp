@@ -43,9 +43,9 @@ class AsyncDecoder {
   /// Makes a decoder. `channel` is stored as the channel of each character.
   explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::search);
 
-  /// Begins anew because the next part does not follow the previous one; keeps the statistics.
+  /// Begins anew because the next part of the capture does not follow the previous one; keeps the statistics.
   void restart(Start start = Start::search);
-  /// Decodes the next part, from tick `first` to `end`, and appends complete characters.
+  /// Decodes the next part of the capture, from tick `first` to `end`, and appends complete characters.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
   /// Works like `decode`, but takes over characters from `guessed`: `other` decoded them from this part after a restart
   /// with `trust`.
@@ -86,7 +86,7 @@ class AsyncDecoder {
 
   Start start_;
   bool begun_ = false;
-  Tick origin_ = 0;  // first tick of the first part
+  Tick origin_ = 0;  // tick at which decoding began
   Tick end_ = 0;     // tick at which the part that was decoded last ends
   // level after all changes given so far; idle is high, also for an inverted line
   bool line_ = true;

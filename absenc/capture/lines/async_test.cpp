@@ -335,7 +335,7 @@ class Slow final : public Reader {
   [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
   [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
 
-  // All threads but the joining one wait here until all claimed blocks were delivered.
+  // Makes each thread, except that which joins the results, wait until all claimed blocks were delivered.
   [[nodiscard]] bool claim(Block& block) override {
     std::unique_lock lock(mutex_);
     if (!is_joining() && claimed_ != arrived_) {
@@ -347,7 +347,7 @@ class Slow final : public Reader {
     claimed_ += more ? 1 : 0;
     return more;
   }
-  // The joining thread waits here until another thread claims at the same time.
+  // Makes the thread that joins the results wait until another thread claims a block at the same time.
   void fill(Block& block) override {
     std::unique_lock lock(mutex_);
     if (is_joining()) wait(lock, [this] { return overlaps_; });

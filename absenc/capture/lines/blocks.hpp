@@ -43,7 +43,8 @@ class LevelReader {
   std::vector<unsigned> channels_;
 };
 
-/// Reads parts into `parts` until `enough(levels)` is true or the capture ends. Consecutive silent parts are merged.
+/// Reads parts of the capture into `parts` until `enough(levels)` is true or the capture ends. Consecutive parts
+/// without level changes are merged.
 template <class Enough>
 void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough) {
   Block block;
@@ -88,7 +89,8 @@ class BlockRun {
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      // the destructor of `stop` makes the worker threads end, and runs before that of `workers` joins them
+      // the destructor of `stop` makes the worker threads end; it runs before the destructor of `workers`, which joins
+      // these threads
       const Stop stop{*this};
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();

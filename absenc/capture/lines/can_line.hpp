@@ -20,7 +20,7 @@ class CanDecoder {
   /// `bit` is the bit time in ticks, at least 3; it need not be a whole number.
   explicit CanDecoder(double bit) : bit_(bit) {}
 
-  /// Decodes the next part, from tick `first` to `end`, and appends its frames.
+  /// Decodes the next part of the capture, from tick `first` to `end`, and appends its frames.
   void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
   /// Ends the capture; a frame that is cut off by the end is no error.
   void finish(std::vector<CanRecord>& frames);

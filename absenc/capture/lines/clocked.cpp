@@ -197,7 +197,8 @@ bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst
   return false;
 }
 
-// Decodes a part. Returns true if it stopped early because a burst begins together with one of `targets`.
+// Decodes a part of the capture. Returns true if it stopped early because a burst begins together with one of
+// `targets`.
 bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
   begin_part(part);
   for (;;) {
@@ -208,7 +209,8 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
   }
   if (!format_.has_select && open_) sample_last_bits(part.end);
   detect_data_change(part.end);
-  // The next part needs the levels of the data lines after the last clock change of this part.
+  // To decode the next part of the capture, the levels of the data lines after the last clock change of this part are
+  // needed.
   in_.before(no_change);
   out_.before(no_change);
   direction_.before(no_change);

@@ -19,9 +19,11 @@ struct ClockedFormat {
   Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
   // without chip select: time from the last clock change to the sample of the word's last bit, in ticks; 0: not sampled
   Tick settle = 0;
-  // without chip select: like `pause`, but for rests in which the data line changes; 0: unused
+  // without chip select: a clock that rests longer than this, in ticks, ends a word if the data line changes during the
+  // rest; 0: unused
   Tick change_pause = 0;
-  // without chip select: number of samples behind that of the last bit, a clock period apart, for a line with a delay
+  // without chip select: number of further samples behind that of the word's last bit, a clock period apart, because
+  // the line delays the bits
   std::uint8_t tail = 0;
   // without chip select: a rest of the clock at its low level never ends a word
   bool low_goes_on = false;
@@ -56,7 +58,7 @@ class ClockedDecoder {
 
   explicit ClockedDecoder(const ClockedFormat& format) : format_(format) {}
 
-  /// Clears the state. Call it if the next part does not follow the previous one.
+  /// Clears the state. Call it if the next part of the capture does not follow the previous one.
   void restart() { *this = ClockedDecoder(format_); }
   void decode(const ClockedPart& part, std::vector<Burst>& bursts);
   /// Works like `decode`, but takes over bursts from `guessed`: `other` decoded them from this part after a restart.

@@ -22,7 +22,7 @@ struct DecodedPart {
   std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first part on
 };
 
-/// A function that receives parts in the order of time; it returns false to end the decoding.
+/// A function that receives the decoded parts of a capture in the order of time; it returns false to end the decoding.
 using PartSink = std::function<bool(const DecodedPart& part)>;
 
 struct AsyncLine {
@@ -64,7 +64,7 @@ struct ClockedLine {
   Tick settle = 0;
   Tick change_pause = 0;
   std::optional<unsigned> direction{};  // index of the channel that is high while the host drives the data line
-  bool low_goes_on = false;             // as in ClockedFormat
+  bool low_goes_on = false;             // true: a rest of the clock at its low level never ends a word
   // delay of line and transceivers, in ticks: as many more samples are taken behind each word
   Tick delay = 0;
   /// Returns, if `pause` is 0, the index of the PauseReading whose limit decides which rests of the clock end a word.

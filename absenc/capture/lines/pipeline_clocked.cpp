@@ -169,7 +169,8 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
            std::to_string(others) + " times, so there is no word: is it the right channel?";
   }
   format.settle = rests->half_period;
-  // A bit is delayed by a clock as soon as the delay is longer than half a period.
+  // A line with a delay of at least half a clock period delays each bit by one clock, with one and a half periods by
+  // two.
   format.tail = static_cast<std::uint8_t>(std::min<Tick>(32, (line.delay / rests->half_period + 1) / 2));
   format.pause = rests->pauses.front();
   if (!line.choose) return {};

@@ -231,8 +231,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution; `run` later adds the rest of its chance. `free_bits`: number of bits of init and xorout that were
-  // chosen to fit.
+  // Adds a solution. Its `chance_log2` does not consider yet how many layouts were tried; `run` adds that at the end.
+  // `free_bits`: number of bits of init and xorout that were chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {

@@ -41,7 +41,7 @@ struct CheckSolution {
   std::vector<std::size_t> first;  // possible positions of the first byte or bit that the checksum covers
   std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
   std::size_t trailing = 0;        // number of bytes, or bits in frames of bits, behind the checksum
-  double chance_log2 = 0;          // log2 of the expected number of such solutions if the frames were random
+  double chance_log2 = 0;          // log2 of the number of solutions like this one that are expected in random frames
 };
 
 struct CheckSearch {

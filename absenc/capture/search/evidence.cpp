@@ -162,7 +162,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // sum of the binomial terms so far, in multiples of the first term
+  double sum = 0;  // sum of the probabilities of exactly `good`, `good` + 1 ... events, in multiples of the first one
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

@@ -37,9 +37,9 @@ struct Evidence {
   std::size_t explained = 0;  // number of exchanges with a good reply
   // number of good exchanges that differ from each other, because a repeated one proves no more
   std::size_t distinct = 0;
-  /// log10 of the probability that the unit would accept as many random frames as good.
+  /// log10 of the probability that the unit would accept at least as many replies as good if the replies were random.
   double frames = 0;
-  /// log10 of the chance that random positions move as little as these; empty: no position changed
+  /// log10 of the chance that random positions move as little as those in the exchanges; empty: no position changed
   std::optional<double> motion{};
 
   /// Returns log10 of the chance of an accident: that random frames are accepted as good and, if every exchange is

@@ -189,7 +189,7 @@ TEST(Hypotheses, NothingWhereNothingIsExplained) {
 
 TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
   for (const Unit* unit : all_units()) {
-    // Vectors of clocked and CAN units are left out, because their frames are not bytes.
+    // The test vectors of clocked and CAN units are left out, because their frames are no sequences of bytes.
     if (carries_bits(unit->link) || unit->link == LinkKind::can) continue;
     unsigned left = test_cases(static_cast<unsigned>(unit->vectors.size()));
     for (const Vector& vector : unit->vectors) {

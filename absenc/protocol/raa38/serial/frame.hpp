@@ -25,7 +25,7 @@ enum class Mode : std::uint8_t {
   bus,        ///< A request that contains the encoder's number.
 };
 
-/// Second byte of a frame: 81 (fixed), Bx with the encoder's number (echo), or either (automatic).
+/// Second byte of a frame: 81 (fixed), Bx with the encoder's number x (echo), or either of these (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
 /// How the zero of an encoder is set; the order code of the encoder decides it.
@@ -38,11 +38,11 @@ enum class Zeroing : std::uint8_t {
 inline constexpr std::uint8_t header = 0xFF;  ///< First byte of each frame.
 /// Second byte of a frame that does not contain the encoder's number.
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
-/// High digit of a request's third byte Bx, which reads the position of unit x.
+/// High digit of the third byte Bx in a request that reads the position of the encoder with the number x.
 inline constexpr std::uint8_t number_mark = 0xB0;
-/// High digit of a request's third byte Cx, which sets the zero of unit x.
+/// High digit of the third byte Cx in a request that sets the zero of the encoder with the number x.
 inline constexpr std::uint8_t clear_mark = 0xC0;
-/// Greatest number of units on a bus: a unit's number is one hexadecimal digit.
+/// Greatest number of encoders on a bus: the number of an encoder is one hexadecimal digit.
 inline constexpr unsigned unit_count = 16;
 inline constexpr unsigned least_bits = 10;  ///< Lowest number of position bits with which an encoder can be ordered.
 /// Highest number of position bits with which an encoder can be ordered.
@@ -84,7 +84,7 @@ struct Format {
   Mode mode = Mode::timing;                        ///< Event on which the encoder sends a frame.
   std::uint8_t unit = 1;                           ///< Number of the encoder on a bus, 0 to 15.
   Zeroing zeroing = Zeroing::none;                 ///< How the zero of the encoder is set.
-  /// Number x in the request BC AA Cx that sets the zero; -1: the number in `unit`.
+  /// Number x in the request BC AA Cx that sets the zero; -1: the encoder's number, `unit`.
   std::int32_t zero_unit = -1;
   std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
   /// Time T3 from the pulse on CLK, or from a request on a bus, to the frame; 0: unknown.
@@ -143,18 +143,18 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Value of `unit` with which decoding accepts a frame of any unit.
+/// Value of the argument `unit` with which decoding accepts a frame of an encoder with any number.
 inline constexpr int any_unit = -1;
 
-/// Returns whether `second_byte` is valid in a frame of `unit`.
+/// Returns whether `second_byte` is valid in a frame of the encoder with the number `unit`, 0 to 15, or `any_unit`.
 [[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
   const bool numbered = unit == any_unit ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
   if (format.second_byte == SecondByte::fixed) return second_byte == fixed_second_byte;
   return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
 }
 
-/// Decodes a frame of `unit`, 0 to 15, or of `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply,
-/// out_of_range.
+/// Decodes a frame of the encoder with the number `unit`, 0 to 15, or of any encoder (`any_unit`). Errors:
+/// wrong_length, bad_checksum, unexpected_reply, out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = any_unit) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
@@ -168,12 +168,12 @@ inline constexpr int any_unit = -1;
 struct Request {
   /// Kinds of requests.
   enum class Kind : std::uint8_t {
-    read,                 ///< The bytes BC AA Bx: read the position of a unit.
-    zero_clear,           ///< The bytes BC AA Cx: set the zero of a unit.
+    read,                 ///< The bytes BC AA Bx: read the position of encoder x.
+    zero_clear,           ///< The bytes BC AA Cx: set the zero of encoder x.
     trigger,              ///< A pulse on CLK, without bytes: send a frame.
     clear,                ///< A pulse on CLR, without bytes: set the zero.
   } kind = Kind::read;    ///< Purpose of the request.
-  std::uint8_t unit = 0;  ///< Number of the unit in the bytes of a request, 0 to 15.
+  std::uint8_t unit = 0;  ///< Number of the encoder in the bytes of a request, 0 to 15.
 };
 
 /// Returns the bytes of a request; empty for a pulse.
@@ -200,8 +200,8 @@ struct Request {
 
 /// Values that a frame contains, or that a command gives as its result. Only members that have a value are reported.
 struct Values {
-  std::optional<std::uint8_t> encoder_address{};  ///< Scan: number of a unit that answered, 0 to 15.
-  /// Scan: true if no answer of the unit was valid, because two encoders have its number or the line is bad.
+  std::optional<std::uint8_t> encoder_address{};  ///< Scan: number of an encoder that answered, 0 to 15.
+  /// Scan: true if all answers from this number were invalid, because two encoders have the number or the line is bad.
   std::optional<bool> clash{};
   std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
   std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.
@@ -209,7 +209,7 @@ struct Values {
   std::optional<std::uint8_t> second_byte{};
   std::optional<double> angle{};              ///< Position within the turn, in degrees.
   std::optional<std::string_view> command{};  ///< Name of the request: read or zero_clear.
-  std::optional<std::uint8_t> unit{};         ///< Number of the unit in the request, 0 to 15.
+  std::optional<std::uint8_t> unit{};         ///< Number of the encoder in the request, 0 to 15.
   std::optional<std::uint64_t> skipped{};     ///< Number of received bytes that belong to no valid frame.
 };
 

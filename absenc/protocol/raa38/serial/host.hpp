@@ -84,9 +84,9 @@ using Dialog = author::DialogOf<Protocol>;
 /// invalid_argument, not_still, cross_check_failed, or those of reading the position.
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
-/// Result of a scan of the units on a bus; the index is the unit number.
+/// Result of a scan of a bus for encoders; the index is the number of the encoder.
 using Units = std::array<Values, unit_count>;
-/// Scans the bus for units. Errors: timeout, unexpected_reply, or that of an exchange.
+/// Scans the bus for encoders. Errors: timeout, unexpected_reply, or that of an exchange.
 author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial

@@ -167,7 +167,7 @@ TEST(Raa38SerialStream, RejectsFramesCloserThanRefreshRate) {
   EXPECT_EQ(accepted_without_rate, 2u);
 }
 
-// The operating system may deliver pieces that end inside frames.
+// The operating system may deliver the bytes of a stream in parts that end inside frames.
 TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
   const Format format{.bits = 14};
   const Wire wire = stream(format, 1, 100);
