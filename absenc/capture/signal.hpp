@@ -62,7 +62,7 @@ struct Burst {
   std::vector<std::uint8_t> out;
   // true: bits of the burst may be missing at its beginning or end
   bool cut = false;
-  // The following members are used only for clocked words without chip select.
+  // The members from `low_before` to `tail_bits` are used only for clocked words without chip select.
   bool low_before = false;  // the clock rested at its low level before the burst
   bool low_after = false;   // the clock rests at its low level after the burst
   // the clock was high at the end of the previous word, and fell during the rest between the two words

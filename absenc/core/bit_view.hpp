@@ -62,7 +62,7 @@ struct BitView {
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(bytes.data(), bytes.size(), first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
-    // when clang 14 evaluates this at compile time, it has not instantiated `register_at` yet
+    // when clang 14 evaluates `window` at compile time, it has not instantiated `register_at` yet
     if (std::is_constant_evaluated()) {
       std::size_t value = 0;
       for (std::size_t i = 0; i < sizeof(std::size_t); ++i) value = value << 8 | bytes[at + i];
@@ -72,13 +72,15 @@ struct BitView {
   }
 
  private:
-  // The function has no loop, so that the compiler can emit a single load.
+  // Returns the machine word that begins at the byte `at`. There is no loop, so that the compiler can emit a single
+  // load.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
-  // The function takes no view: a call with the address of a view would force the view into memory.
+  // Does the work of `window` for a view shorter than a machine word. It does not take the view itself as an argument:
+  // its address would force the view into memory.
   [[nodiscard, gnu::noinline]] static constexpr std::size_t short_window(const std::uint8_t* bytes, std::size_t count,
                                                                          std::size_t first) {
     std::size_t value = 0;

@@ -40,7 +40,7 @@ enum class Error : std::uint8_t {
 /// Name, description and advice for one kind of error.
 struct ErrorText {
   std::string_view name;         ///< name of the error, as printed by the command and written in test vectors
-  std::string_view description;  ///< sentence that states what usually happened
+  std::string_view description;  ///< sentence that states what usually happened when this error is reported
   std::string_view advice;       ///< advice what the user can try; "" if none
 };
 

@@ -364,7 +364,7 @@ bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   if (carries_) start = std::max(start, cycle_.begun);
   const bool fits = step_.kind == Kind::configure || duration(step_) <= due_ - start;
   if (!fits && !is_row_ && !takes_ && !carries_) {
-    // The request is too long if nothing but the position kept it from being sent.
+    // The request can never fit between two positions if it does not fit directly behind a position.
     is_too_long_ = is_too_long_ || (now == free_since_ && step_.at <= std::max(now, rested_at_));
     if (is_too_long_ && !service_->takes_cycles_) {
       service_->needs_ = duration(step_);

@@ -47,7 +47,7 @@ TEST(Extrapolation, WrapsAsTheEncoderDoes) {
   EXPECT_EQ(one.at(Time(3000)), 0xFFD0u);
 }
 
-// The motion has constant acceleration, for which the class states its greatest error.
+// The motion has constant acceleration, for which the comment of Extrapolation states the greatest error of a position.
 RC_GTEST_PROP(ExtrapolationProperty, KeepsItsStatedError, ()) {
   const auto bits = *rc::gen::inRange(10u, 33u);
   const double speed = *rc::gen::inRange(-200, 201);           // speed in revolutions/s

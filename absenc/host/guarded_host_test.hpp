@@ -50,7 +50,7 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Returns the number of injected faults that change bytes, of all such kinds.
+/// Returns the number of injected faults of all kinds that change bytes.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -221,7 +221,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // stays false if `drive_one` throws: the stream has then ended
+      streaming_ = false;  // if `drive_one` throws, no stream can be continued
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);

@@ -41,9 +41,9 @@ struct FaultRates {
   /// Number of bytes that one character carries, 1 or 2: drop, truncate and garbage remove or add whole characters.
   std::uint8_t character_bytes = 1;
 
-  /// Returns the probability of faults of this kind; a reference that can be assigned to.
+  /// Returns the probability of faults of the kind `kind`, as a reference that can be assigned to.
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }
-  /// Returns the probability of faults of this kind, 0 to 1.
+  /// Returns the probability of faults of the kind `kind`, 0 to 1.
   constexpr double operator[](FaultKind kind) const { return rates[static_cast<std::size_t>(kind)]; }
 };
 
@@ -75,7 +75,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
 
   /// Sets the probabilities of faults, from the next reply or received byte on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
-  /// Returns the number of injected faults of this kind.
+  /// Returns the number of injected faults of the kind `kind`.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
   /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }

@@ -150,16 +150,17 @@ ShaftState Motion::at(Time time) const {
 ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
-  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), numerator and denominator divided by 2^17.
+  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9). Numerator and denominator are divided by 2^17; both are then
+  // whole numbers.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
-  constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17, without rounding
+  constexpr std::uint64_t denominator = 457'763'671'875;
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),
           saturated(static_cast<double>(speed.micro_rpm) / 1e3), 0};
 }
 
 ShaftState Motion::offset_at(const Sine& sine, Time time) {
   // Whole periods of the sine are removed exactly, so that its phase is as accurate after a day as in the first second.
-  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // one period of the sine in micro-hertz * ns
+  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // after a period: time in ns * frequency in micro-hertz
   const auto phase = multiply_divide(sine.micro_hertz, magnitude(time.count()), one_period).remainder;
   const double turn = static_cast<double>(phase) / static_cast<double>(one_period);
   const double angle = 2 * std::numbers::pi * (time.count() < 0 ? -turn : turn);

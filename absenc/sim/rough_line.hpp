@@ -28,7 +28,7 @@ struct RoughRates {
 /// Counts of the requests, the replies and the disturbances of a rough line.
 struct RoughCounts {
   std::uint64_t requests = 0;  ///< number of transfers and pulses of the host
-  std::uint64_t replies = 0;   ///< frames that the device sent to the host
+  std::uint64_t replies = 0;   ///< number of frames that the device sent to the host
   std::uint64_t damaged = 0;   ///< number of frames that were damaged by any fault except `late`
   std::uint64_t late = 0;      ///< number of frames that were delayed
 };

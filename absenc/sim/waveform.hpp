@@ -110,7 +110,7 @@ class Waveform {
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time
-  std::array<FirstByte, 2> first_bytes_{};  // stored first bytes, indexed by the wire
+  std::array<FirstByte, 2> first_bytes_{};  // first bytes of characters of two bytes, indexed by the wire
   Time end_{};
 };
 

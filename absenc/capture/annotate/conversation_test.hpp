@@ -89,7 +89,7 @@ class Talker {
       if (host_) {
         line_.replace(*host_, *conversation);
       } else {
-        // The host stops a `read` command of an encoder that streams after its first result.
+        // If the encoder streams, the host stops a `read` command after its first result.
         host_ = line_.attach(sim::NodeRole::host, *conversation, [this] { return !streams_; });
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));

@@ -35,7 +35,7 @@ class Exchanges {
  public:
   /// A request whose reply has not been found yet.
   struct PendingRequest {
-    // number of bytes that are stored; a longer request is cut, as it cannot be good
+    // number of bytes of a request that are stored; a longer request is cut, because it cannot be good
     static constexpr std::size_t capacity = 272;
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;

@@ -57,7 +57,8 @@ void take_zip64(DirectoryEntry& entry, Bytes extra) {
   }
 }
 
-// Returns `size` bytes of the source from `at` on; nothing if they are not there.
+// Returns `size` bytes of the source from `at` on. Returns nothing if the source has fewer bytes, reading fails, or
+// `size` is above `longest_piece`.
 std::optional<std::vector<std::uint8_t>> bytes_at(Source& source, std::uint64_t at, std::uint64_t size) {
   if (at > source.size() || size > source.size() - at || size > longest_piece) return std::nullopt;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(size));

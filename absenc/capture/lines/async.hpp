@@ -54,7 +54,7 @@ class AsyncDecoder {
   /// Ends the capture; appends the remaining characters.
   void finish(std::vector<Character>& characters);
 
-  /// Returns a time before which no character begins that is still to be returned.
+  /// Returns a time at or before the begin of all characters that are still to be returned.
   [[nodiscard]] Tick settled() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   [[nodiscard]] const AsyncFormat& format() const { return format_; }
@@ -87,7 +87,7 @@ class AsyncDecoder {
   Start start_;
   bool begun_ = false;
   Tick origin_ = 0;  // tick at which decoding began
-  Tick end_ = 0;     // tick at which the part that was decoded last ends
+  Tick end_ = 0;     // tick at which the last decoded part of the capture ends
   // level after all changes given so far; idle is high, also for an inverted line
   bool line_ = true;
   bool level_ = true;           // level before the first change in `edges_`

@@ -10,7 +10,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
-constexpr std::size_t fewest_changes = 4;  // number of changes below which no bit time can be found
+constexpr std::size_t fewest_changes = 4;  // number of level changes below which no bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
 constexpr int most_bits = 4;   // each group of pulses of similar length is tried as pulses of 1 to 4 bits

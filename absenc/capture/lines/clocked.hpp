@@ -65,7 +65,7 @@ class ClockedDecoder {
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
   /// Ends the capture; a burst in progress is appended as cut.
   void finish(std::vector<Burst>& bursts);
-  /// Returns a time before which no further burst begins; `end` is the end of the last part.
+  /// Returns a time before which no further burst begins; `end` is the end of the last decoded part of the capture.
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
 
  private:
@@ -73,7 +73,7 @@ class ClockedDecoder {
   struct Wire {
     bool level = false;
     std::span<const Tick> left{};  // changes of the wire that are not handled yet, in ticks
-    // additional change of the wire at the border of two parts, if the levels there differ
+    // additional change of the wire at the border of two parts of the capture, if the levels there differ
     std::optional<Tick> border{};
 
     void begin(const Changes* changes, Tick first, bool known);

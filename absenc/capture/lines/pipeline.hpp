@@ -14,12 +14,12 @@
 
 namespace absenc::capture {
 
-/// Characters or bursts that were decoded since the previous part.
+/// A part of a decoded capture: the characters or bursts that were decoded since the previous DecodedPart.
 struct DecodedPart {
-  Tick end = 0;  // no character or burst of a later part begins before this time
+  Tick end = 0;  // no character or burst of a later DecodedPart begins before this time
   std::span<const Character> characters;
   std::span<const Burst> bursts;
-  std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first part on
+  std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first DecodedPart on
 };
 
 /// A function that receives the decoded parts of a capture in the order of time; it returns false to end the decoding.

@@ -15,15 +15,16 @@ namespace absenc::raa38 {
 /// Settings of a virtual encoder, stored in a memory of a few bytes.
 class Settings {
  public:
-  /// Index in the memory of the encoder's number on its line, 1 byte.
+  /// Index in the memory at which the encoder's number on its line is stored, 1 byte.
   static constexpr std::size_t number_at = 0;
-  /// Index in the memory of the bit rate, 1 byte: an index in the table of rates.
+  /// Index in the memory at which the bit rate is stored, 1 byte: an index in the table of rates.
   static constexpr std::size_t rate_at = 1;
-  /// Index in the memory of the direction, 1 byte: 1 if the encoder counts down.
+  /// Index in the memory at which the direction is stored, 1 byte: 1 if the encoder counts down.
   static constexpr std::size_t direction_at = 2;
-  /// Index in the memory of the shaft position that is the encoder's zero, 4 bytes in counts.
+  /// Index in the memory at which the shaft position that is the encoder's zero is stored, 4 bytes in counts.
   static constexpr std::size_t zero_at = 3;
-  static constexpr std::size_t writes_at = 7;  ///< Index in the memory of the number of writes, 4 bytes.
+  /// Index in the memory at which the number of writes is stored, 4 bytes.
+  static constexpr std::size_t writes_at = 7;
 
   /// Creates settings with this address or node number and this index of the bit rate; `shaft` must outlive them.
   Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
