@@ -14,8 +14,8 @@ namespace absenc::host {
 
 /// A driver of conversations on a line. Call all members in one context, for example from interrupts of one priority.
 ///
-/// Line has `void begin(const Step<Item>&)`, which does not wait for the end of the step, and `void result(bool over)`:
-/// `over` is false at `emit` and true at `done`.
+/// `Line` must have these functions: `void begin(const Step<Item>&)`, which does not wait for the end of the step, and
+/// `void result(bool over)`, for which `over` is false at `emit` and true at `done`.
 template <class Item, class Line>
 class Carrier {
  public:
@@ -183,8 +183,7 @@ class Carrier {
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
   // Members that are used for every received character come first, so that short instructions can address them.
-  // number of received characters that are delivered to the machine together; below 2: each character at once
-  std::uint8_t expected_ = 0;
+  std::uint8_t expected_ = 0;  // number of received characters to deliver together; below 2: each character at once
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
   bool sending_ = false;

@@ -95,8 +95,8 @@ struct Cycle {
 /// service waits between its requests, positions are read. If the plan says `carried`, a service's request takes the
 /// place of the position's, and its reply gives both.
 ///
-/// Item is the link's, `Read` a callable that returns the Conversation of one position each time that it is called; the
-/// conversation is used until the next call. It must end by itself.
+/// `Item` is the item of the link; `Read` is a callable that returns the Conversation of one position each time that it
+/// is called; the conversation is used until the next call. It must end by itself.
 template <class Item, class Read>
 class CyclicHost final : public Machine<Item> {
  public:

@@ -39,7 +39,8 @@ struct Counters {
   }
 };
 
-/// A filter between the echo filter and the reply guard; without a guard, before the conversation itself.
+/// A filter between the echo filter and the reply guard, or, without a guard, between the echo filter and the
+/// conversation.
 template <class Item>
 struct Filter : Machine<Item> {
   /// Sets the machine to which the filter passes events from now on.

@@ -39,7 +39,7 @@ class Annotator {
     bool begins_silent = false;  // true: the line was silent before the capture began
     // true: characters have the times of their arrival at a program, not those on the line; only for one channel
     bool by_arrival = false;
-    // with `by_arrival`: shortest pause between characters that cannot come from the transport to the program
+    // with `by_arrival`: shortest pause between characters that the transport to the program cannot have caused
     Tick gap = 1;
   };
 

@@ -71,7 +71,7 @@ class AsyncDecoding {
   [[nodiscard]] AsyncDecoder::Statistics statistics(std::size_t line) const { return decoders_[line].statistics(); }
 
  private:
-  // Prepares the decoders for the next part. If there is a gap in the capture before it, the characters in progress
+  // Prepares the decoders for the next part of the capture. If there is a gap before it, the characters in progress
   // end.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) finish_lines();
@@ -103,8 +103,8 @@ class AsyncDecoding {
     characters.swap(bytes);
   }
 
-  // Delivers the characters that begin before `until` and the end of the last part. Returns false if the sink ends the
-  // decoding.
+  // Delivers the characters that begin before `until` and before the end of the last decoded part of the capture.
+  // Returns false if the sink ends the decoding.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
@@ -172,7 +172,8 @@ class FirstChanges {
     return all || any;
   }
 
-  // Drops the changes after a fixed number, so that the detected settings do not depend on the sizes of the parts.
+  // Drops all level changes after a fixed number of them, so that the detected settings do not depend on the sizes of
+  // the parts.
   void cut() {
     for (const Changes& line : changes_) {
       if (line.at.size() > most_changes) end_ = std::min(end_, line.at[most_changes]);

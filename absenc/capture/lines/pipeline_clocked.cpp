@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_clocks = 8194;  // number of clock changes that suffice to find the period
-// Limit for the number of data and chip select changes that are stored while the clock has too few changes.
+// Limit for the number of level changes of data and chip select that are stored while the clock has too few changes.
 constexpr std::size_t most_data = 64 * 16384;
 
 // Indices of the wires of a clocked line among the channels that are read.
@@ -75,7 +75,7 @@ class ClockedDecoding {
   [[nodiscard]] bool selected() const { return selected_; }
 
  private:
-  // Prepares the decoder for the next part. If there is a gap in the capture before it, the burst in progress ends.
+  // Prepares the decoder for the next part of the capture. If there is a gap before it, the burst in progress ends.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) decoder_.finish(bursts_);
     const Changes& clock = levels.changes[0];

@@ -46,8 +46,8 @@ double relative_distance(const Reading& from, const Reading& to) {
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Returns log10 of the chance that random positions would be as near to each other as these; nothing if the position
-// never changes.
+// Returns log10 of the chance that random positions would be as near to each other as `positions`; nothing if the
+// position never changes.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
