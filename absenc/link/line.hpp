@@ -10,7 +10,7 @@ namespace absenc {
 
 /// Kinds of links: how items (bytes, bits or frames) travel.
 enum class LinkKind : std::uint8_t {
-  half_duplex,  ///< one pair for both directions (RS-485): never send while the other side sends
+  half_duplex,  ///< one pair of wires for both directions (RS-485): never send while the other side sends
   full_duplex,  ///< a pair of wires for each direction (RS-422, RS-232, USB serial)
   spi,          ///< SPI: the host's clock moves one byte in each direction at the same time
   /// The host clocks bits out of the encoder (SSI, BiSS), packed MSB first, the last byte left-aligned.

@@ -19,8 +19,8 @@ enum class NodeRole : std::uint8_t { host, device };
 /// One shared line with the machines on it.
 ///
 /// A character of more than 8 data bits carries two bytes, which arrive one after the other. Overlapping characters on
-/// one pair are combined by AND. CAN frames are arbitrated by identifier; frames that begin together with the same
-/// identifier but other data are a `line_error` for every node. A node receives its own characters only with
+/// one pair of wires are combined by AND. CAN frames are arbitrated by identifier; frames that begin together with the
+/// same identifier but other data are a `line_error` for every node. A node receives its own characters only with
 /// `set_echo`. A machine that begins a transfer or pulse before its last one was sent causes a std::logic_error, except
 /// a transfer of a device on an SPI or clocked link.
 template <class Item>
