@@ -32,8 +32,8 @@ enum class Demand : std::uint8_t {
   page_alone,  ///< a write to `page` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, reading it gets a busy reply.
   byte_busy,
-  /// With `page` selected, the request `ask` for a byte that hosts may not access gets a valid reply to the command
-  /// `as`.
+  /// With `page` selected, the encoder answers the request `ask`, which reads a byte that hosts may not access, with a
+  /// valid reply of the kind that the command `as` gets.
   page_closed,
   set,  ///< the setting `setting` reads back as the value written: `value` or `other`
   /// The zero command with the argument `value` makes the position about 0.
@@ -98,23 +98,24 @@ struct Clause {
   /// Conditions on options under which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: the
   /// clause always applies.
   std::string_view needs{};
-  Errors errors = 0;  ///< for Demand::as_drawn: errors of replies that break the clause; 0: form_errors
+  Errors errors = 0;  ///< for Demand::as_drawn: a reply with one of these errors breaks the clause; 0: form_errors
   Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
   Reaction reaction = Reaction::silent;  ///< for Demand::reacts: required reaction of the encoder to `ask`
   std::string_view as{};  ///< command whose reply must be the reaction to `ask`; "": a reply to `ask` itself
   /// For Demand::whole, checked, as_drawn: option that is set to `value` for the readings; "": none.
   std::string_view option{};
-  std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
-  std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
-  std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
-  std::string_view setting{};  ///< setting that the clause is about, or that access to its memory byte changes
+  std::int64_t value = 0;     ///< value of `option`, or the number that the demand names `value`
+  std::uint32_t page = 0;     ///< Page of the memory byte that the clause is about.
+  std::uint32_t address = 0;  ///< Address of the memory byte that the clause is about.
+  /// Setting that the clause is about; for demands about memory: setting that access to the memory byte changes.
+  std::string_view setting{};
   /// Name of the field that carries the value of `setting` in the result of the command that reads it.
   std::string_view field{};
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
   Verb verb = Verb::run;       ///< For Demand::reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command, for demands that name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
-  /// Options of a virtual encoder that shows the case: "resolution=20&multiturn_bits=0".
+  /// Options of a virtual encoder with which the clause applies and can be tested: "resolution=20&multiturn_bits=0".
   std::string_view shown_with{};
 };
 
@@ -135,8 +136,8 @@ struct HostStep {
   /// Pause before the request, after the last sent character. It is longer than a reply takes,
   /// unless the step is to send during the encoder's transmission.
   Time pause{};
-  /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020". They are sent
-  /// without a pause in between: a request of several frames is a step for each frame.
+  /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020". No pause separates the
+  /// bytes: a request of several frames with pauses between them is written as one step for each frame.
   std::string_view what{};
   /// Arguments of the command; empty: each required argument is 1, or its minimum if that is greater.
   std::span<const std::int64_t> arguments{};
@@ -153,16 +154,18 @@ struct HostClause {
   HostDemand demand;           ///< Kind of the clause, which selects its test.
   /// For HostDemand::rule and HostDemand::row: name of the rule that hosts must keep.
   std::string_view rule{};
-  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if none of the
-  /// hosts that the tests use for every clause breaks this clause. If each such host that breaks one rule also breaks
-  /// another, both rules belong into one clause.
+  /// Scripted hosts that break this clause and no other, except perhaps the clause "asks"; empty: none. They are needed
+  /// if none of the hosts that the tests use for every clause breaks this clause. If every host that breaks this clause
+  /// also breaks another one, the two demands belong into one clause.
   std::array<HostScript, 2> breaks{};
-  HostScript keeps{};  ///< a scripted host that keeps this clause, with requests like those of `breaks`; empty: none
+  /// A scripted host that keeps this clause, although its requests resemble those of `breaks`; empty: none.
+  HostScript keeps{};
   /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".
   std::string_view options{};
 };
 
-/// Rule that os::SpiDevice checks, because a virtual encoder cannot see the clock's edges.
+/// Name of the rule that a host must use the encoder's SPI mode. os::SpiDevice checks the rule, because a virtual
+/// encoder cannot see the clock's edges.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
 /// The clauses of a unit. The unit's descriptor has no pointer to them, because firmware would then link the clauses,

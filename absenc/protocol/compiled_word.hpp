@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A word format compiled into shifts and masks of one number.
+// Decodes position words fast: a word format is compiled into shifts and masks, which are applied to the word as one
+// number of at most 64 bits.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace absenc {
 
-/// A compiled word format; it gives the same values as `decode_word`.
+/// A word format compiled into shifts and masks. Decoding with it gives the same values as `decode_word`.
 class CompiledWord {
  public:
   /// Greatest number of bits of a word together with the bits that follow it.

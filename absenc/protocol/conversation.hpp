@@ -26,10 +26,10 @@ struct Exchange {
 /// Two texts for people that explain an error; either may be empty.
 struct Explanation {
   std::string_view detail{};  ///< the step of the command that failed, and the evidence for this
-  std::string_view advice{};  ///< what to try, instead of the error's own advice
+  std::string_view advice{};  ///< advice to the user, which replaces the general advice of the error
 };
 
-/// Counts of a conversation that streams.
+/// Counts of a conversation that streams: each of its steps `emit` gives a result.
 struct StreamCounts {
   /// Estimated number of frames that were received damaged.
   std::uint64_t discarded = 0;
@@ -115,7 +115,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual MutableBytes memory() = 0;
   /// Returns a number that the encoder increments with every change that it makes to `memory`.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
-  /// Returns the first rule breaches of the host.
+  /// Returns the first rule breaches of the host in order of time, as many as the encoder stores (HostRules: 16).
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   /// Returns how often the host broke a rule.
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;

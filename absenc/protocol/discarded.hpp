@@ -35,7 +35,7 @@ class DiscardedFrames {
   std::size_t frame_bytes_;
   bool begun_ = false;
   std::uint64_t skipped_ = 0;
-  std::uint64_t before_ = 0;  // discarded frames up to the last valid frame
+  std::uint64_t before_ = 0;  // estimated number of discarded frames before the last valid frame
   std::uint64_t gap_ = 0;     // bytes skipped after the last valid frame, or since the start
 };
 

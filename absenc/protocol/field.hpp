@@ -23,7 +23,7 @@ struct FlagInfo {
   std::uint32_t sums = 0;
 };
 
-/// Action or advice for an error whose cause the alarms name.
+/// Advice to the user for an error, or for a status flag, whose cause the alarms of the encoder name.
 inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
 /// Description of a field, which is a named value in requests, replies or results.
@@ -51,9 +51,9 @@ struct FieldInfo {
 /// A field together with its value.
 struct FieldValue {
   const FieldInfo* info;    ///< Description of the field.
-  std::int64_t number = 0;  ///< value of kinds number, counts, boolean and flags
-  double real = 0;          ///< value of kind real
-  Bytes bytes{};            ///< value of kinds text and bytes; valid during the call of `put`
+  std::int64_t number = 0;  ///< value of a field of kind number, counts, boolean or flags
+  double real = 0;          ///< value of a field of kind real
+  Bytes bytes{};            ///< value of a field of kind text or bytes; valid during the call of `put`
 };
 
 /// Receiver to which decoders deliver the values of fields, one by one.

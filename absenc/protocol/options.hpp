@@ -27,11 +27,11 @@ enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 /// Description of an option of a unit: a number, or one of `choices` (the value is the index). With `decimals`, its
 /// values are in units of the last decimal digit.
 struct Option {
-  std::string_view name;                        ///< Name of the option.
-  std::string_view meaning;                     ///< Meaning of the option, with its unit.
-  std::int64_t default_value;                   ///< Value if neither the user nor a model sets the option.
-  std::int64_t minimum = 0;                     ///< Lowest value of a number, apart from the 0 of `or_zero`.
-  std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
+  std::string_view name;       ///< Name of the option.
+  std::string_view meaning;    ///< Meaning of the option, with its unit of measure.
+  std::int64_t default_value;  ///< Value if neither the user nor a model sets the option.
+  std::int64_t minimum = 0;    ///< Lowest value, if the option is a number; `or_zero` may permit 0, too.
+  std::int64_t maximum = 0;    ///< Highest value, if the option is a number.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
   bool probeable = false;                       ///< true: captured frames can show the value of the option
   unsigned decimals = 0;                        ///< Most digits after the decimal point that the user may write.
@@ -83,7 +83,7 @@ struct OptionText {
 
 /// Why options were refused, with the part of the user's text that is wrong.
 struct OptionError {
-  /// Kind of the error; `none`: the options were accepted.
+  /// Reason of the refusal; `none`: the options were accepted.
   enum class Kind : std::uint8_t {
     none,
     unknown_model,
@@ -91,7 +91,7 @@ struct OptionError {
     bad_value,
     bad_word,           ///< the word format is invalid: the member `word` has the reason and the place
     beside_word,        ///< the option `text`, or a model ("model"), was given together with a word format
-  } kind = Kind::none;  ///< Kind of the error.
+  } kind = Kind::none;  ///< Reason of the refusal.
   /// The name or value that is wrong, as the user wrote it. Kind::beside_word: the name of the option that cannot be
   /// given together with a word format, or `model`.
   std::string_view text{};
@@ -106,7 +106,7 @@ struct Unit;
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
-/// Sets each option that has `sharing_choices` and is `auto` to `true`.
+/// Changes the value of each option with `sharing_choices` from `auto` to `true`: other encoders share the line.
 void tell_shared(const Unit& unit, Options& options);
 
 /// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.

@@ -23,7 +23,7 @@ inline WordFormat random_word(sim::Random& random) {
   for (std::size_t i = meanings.size() - 1; i > 0; --i) std::swap(meanings[i], meanings[random.below(i + 1)]);
 
   WordFormat format;
-  unsigned counting = 64;  // bits that are left for position and turns together
+  unsigned counting = 64;  // number of bits, of 64, that position and turns have not used yet
   for (std::size_t i = 0; i < meanings.size(); ++i) {
     const bool counts = meanings[i] == Meaning::position || meanings[i] == Meaning::multiturn;
     const bool flag = meanings[i] >= Meaning::error && meanings[i] <= Meaning::parity;

@@ -21,7 +21,7 @@ enum class Role : std::uint8_t {
   encoder,   ///< option, field: address of the encoder on the line; in a scan this field begins a new record
   identity,  ///< field: identifies the encoder or its interface: type, serial number
   clash,     ///< field of a scan: not 0: answers at this address are damaged, or from two encoders
-  trouble,   ///< field of a scan: the fault of an answer that was complete
+  trouble,   ///< field of a scan: text about the fault of a complete reply, for example a refusal
   rate,      ///< option: bit rate; its choices are bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds
   check_width,       ///< option: width of the checksum in bits

@@ -44,7 +44,8 @@ class Sentence {
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:
-  std::array<char, 400> text_;  // not initialized: each Reported conversation has a sentence, and few use it
+  // not initialized, to save time: each conversation of the class Reported has a Sentence, but few use it
+  std::array<char, 400> text_;
   std::size_t size_ = 0;
 };
 

@@ -38,10 +38,10 @@ enum class Verb : std::uint8_t {
 /// Description of an argument of a command.
 struct Argument {
   std::string_view name;           ///< Name of the argument, as in `NAME=VALUE`.
-  std::string_view meaning;        ///< Meaning of the number, with its unit, as a phrase.
-  std::int64_t minimum;            ///< Lowest permitted value.
-  std::int64_t maximum;            ///< Highest permitted value.
-  std::int64_t default_value = 0;  ///< Value if the user does not give an argument that is not `required`.
+  std::string_view meaning;        ///< Meaning of the argument, with its unit of measure, as a phrase.
+  std::int64_t minimum;            ///< Lowest permitted value of the argument.
+  std::int64_t maximum;            ///< Highest permitted value of the argument.
+  std::int64_t default_value = 0;  ///< Value of an argument that is not `required`, if the user does not give it.
   bool required = true;            ///< Whether the user must give the argument.
   Role role = Role::other;         ///< Role by which programs that do not know the unit find the argument.
 };
@@ -74,9 +74,9 @@ struct Command {
 struct MemoryArea {
   std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
   std::uint32_t first;           ///< First address of the area on its page.
-  std::uint32_t count;           ///< Number of addresses on each page.
+  std::uint32_t count;           ///< Number of addresses of the area on each page.
   std::string_view meaning;      ///< Content of the area, as a phrase.
-  bool writable = true;          ///< Whether hosts may write the bytes.
+  bool writable = true;          ///< Whether hosts may write the bytes or words of the area.
   bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
   /// Why memory_write needs its argument with the role force for this area; "": it needs none.
@@ -104,12 +104,12 @@ struct RegisterInfo {
 /// A property of a virtual encoder that can be set while it runs, such as its temperature.
 struct Condition {
   std::string_view name;  ///< Name of the condition.
-  /// Unit of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
+  /// Unit of measure of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
   std::string_view unit;
-  std::string_view meaning;  ///< Meaning of the number, with its unit, as a phrase.
-  std::int64_t minimum;      ///< Lowest permitted value.
-  std::int64_t maximum;      ///< Highest permitted value.
-  std::int64_t normal;       ///< initial value: that of a healthy installation
+  std::string_view meaning;  ///< Meaning of the condition, with its unit of measure, as a phrase.
+  std::int64_t minimum;      ///< Lowest permitted value of the condition.
+  std::int64_t maximum;      ///< Highest permitted value of the condition.
+  std::int64_t normal;       ///< initial value of the condition: that of a healthy installation
 };
 
 /// A frame in the form that its link carries.
@@ -130,10 +130,10 @@ struct Expected {
   std::string_view text{};  ///< Expected bytes of a text or bytes field.
 };
 
-/// Consecutive bytes of a vector's frame that its author left open. On clocked links: bits.
+/// Consecutive bytes (on clocked links: bits) of a test vector's frame whose values the vector does not state.
 struct OpenBytes {
-  std::size_t first = 0;  ///< Index of the first open byte.
-  std::size_t count = 0;  ///< Number of open bytes; 0: the frame is complete.
+  std::size_t first = 0;  ///< Index of the first byte (clocked links: bit) without a stated value.
+  std::size_t count = 0;  ///< Number of bytes (clocked links: bits) without stated values; 0: all are stated.
 };
 
 /// A test vector: frames, with the fields or the error that decoding must give. On clocked links frames are texts of 0
@@ -147,10 +147,12 @@ struct Vector {
   Bytes reply;                         ///< Bytes of the reply; empty: none.
   std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
   Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
-  OpenBytes open_request{};            ///< Bytes of the request that the vector leaves open; the tests compute them.
-  OpenBytes open_reply{};              ///< Bytes of the reply that the vector leaves open; the tests compute them.
+  /// Bytes of the request whose values the vector does not state; the tests compute them.
+  OpenBytes open_request{};
+  /// Bytes of the reply whose values the vector does not state; the tests compute them.
+  OpenBytes open_reply{};
 
-  /// Returns whether no byte is left open.
+  /// Returns whether the vector states the values of all bytes of its frames.
   [[nodiscard]] constexpr bool is_complete() const { return open_request.count == 0 && open_reply.count == 0; }
 };
 
@@ -212,7 +214,7 @@ struct Follower {
   ~Follower() = default;
 };
 
-/// Decoder for many frames of one encoder. It is made of the encoder's options once, with the format compiled.
+/// Decoder for many frames of one encoder. It is constructed once from the encoder's options, and compiles the format.
 struct FrameDecoder {
   /// Checks a frame and puts its fields into `sink`, as Unit::decode.
   virtual Error decode(Frame request, Frame reply, FieldSink& sink) const = 0;
@@ -257,8 +259,8 @@ inline constexpr std::size_t longest_encoded = 1024;
 
 /// Resolution of an encoder: bits of its position and turns, and the length of a linear count.
 struct Resolution {
-  unsigned singleturn_bits = 0;   ///< Bits of the position within the turn, or of a linear encoder; 0: none.
-  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
+  unsigned singleturn_bits = 0;   ///< Number of bits of the position, within the turn or linear; 0: none.
+  unsigned multiturn_bits = 0;    ///< Number of bits of the turns; 0: none.
   double unit_um = 0;             ///< linear encoders: micrometres per count; 0: rotary, or not known
   bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
 };
@@ -345,8 +347,9 @@ struct Unit {
   LineSettings (*settings)(const Options& options) = nullptr;
   /// Another unit, which describes the same encoder behind an SPI controller; null: there is none.
   const Unit* over_spi = nullptr;
-  /// Compares captures, in the order of time, with values of some options, and puts the evidence into `sink`. Returns
-  /// whether no capture contradicts the values left in `options`. Null: frames do not show option values.
+  /// Compares captures, in the order of time, with values of some options, puts the evidence into `sink`, and stores in
+  /// `options` the values that the captures show. Returns whether no capture contradicts the stored values. Null:
+  /// frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;

@@ -59,7 +59,7 @@ struct WordValues {
   std::uint32_t alarms;
 };
 
-/// The fields of WordValues: names, units and meanings.
+/// The fields of WordValues: names, units of measure and meanings.
 inline constexpr auto word_fields = author::fields_of<WordValues>(
     author::field<&WordValues::multiturn>("multiturn", "revolutions", "turns", Role::turns),
     author::field<&WordValues::singleturn>("singleturn", "counts", "position within the turn", Role::position),
@@ -92,7 +92,7 @@ struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
   /// C++ type of the decoded values of the word.
   using Word = absenc::Word;
-  const Format& format;    ///< Format of the encoder, of which the word format is a part.
+  const Format& format;    ///< Format of the encoder (frame layout, options), which contains the word format.
   const WordFormat& word;  ///< Format of the position word.
 
   /// Calls `use` with each field of the word, until a call returns false. Returns true if no call did.
@@ -111,14 +111,15 @@ struct Given {
 /// A format that is known at compile time, in the form that the functions for position words take.
 template <const auto& known>
 struct Known {
-  static constexpr bool is_known = true;                 ///< Whether the format is known at compile time.
-  static constexpr const auto& format = known;           ///< Format of the encoder, of which the word format is a part.
-  static constexpr const WordFormat& word = known.word;  ///< Format of the position word.
+  static constexpr bool is_known = true;  ///< Whether the format is known at compile time.
+  /// Format of the encoder (frame layout, options), which contains the word format.
+  static constexpr const auto& format = known;
+  static constexpr const WordFormat& word = known.word;      ///< Format of the position word.
   static constexpr std::size_t size = word.fields().size();  ///< Number of fields of the word.
   /// C++ type of the decoded values of the word.
   using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
 
-  /// The field `i` of the word, with its place as constants.
+  /// The field with the index `i` in the word format; its members are constants.
   template <std::size_t i>
   struct Field {
     static constexpr std::size_t index = i;                       ///< Index of the field in the format.
@@ -332,12 +333,14 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   return word;
 }
 
-/// Returns the format of a word with position and turns. A part of 0 or more than 64 bits is left out.
+/// Returns the format of a word with position and turns. Position or turns are left out if they have 0 or more than 64
+/// bits.
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
   const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
-  if (bits.multiturn_first) format.add(turns);  // a part of 0 bits is left out, because `add` refuses a field of 0 bits
+  // position or turns of 0 bits are left out, because `add` refuses a field of 0 bits
+  if (bits.multiturn_first) format.add(turns);
   format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;

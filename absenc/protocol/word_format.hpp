@@ -62,7 +62,7 @@ class WordFieldName {
 struct WordField {
   WordFieldName name{};             ///< name of the field: that of its meaning, unless the text gives another
   Meaning meaning = Meaning::skip;  ///< Meaning of the field.
-  std::uint8_t bits = 0;            ///< number of bits, 1 to 64; error, warning and parity have 1
+  std::uint8_t bits = 0;            ///< number of bits of the field, 1 to 64; error, warning and parity have 1
   bool active_low = false;          ///< whether the field is sent inverted: a flag is set when 0, parity is odd
 };
 
@@ -234,7 +234,8 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 }
 
 namespace detail {
-void this_is_no_word_format();  // not constexpr: a call at compile time is an error with this name
+// not constexpr, so that an invalid word format in a program is a compile error that names this function
+void this_is_no_word_format();
 
 consteval WordFormat word_format_or_stop(std::string_view text) {
   WordFormat format;

@@ -54,13 +54,13 @@ inline constexpr Option after_word_option{.name = "after_word",
                                           .default_value = 0,
                                           .choices = after_word_choices};
 
-/// A protocol format together with the options that describe its position word.
+/// The format of a protocol (its struct Format), together with the options that describe the position word.
 template <class Format>
 struct WordSettings : Format {
-  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: linear encoder.
-  std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
+  std::uint8_t singleturn_bits = 0;  ///< Number of bits of the single-turn position; 0: linear encoder.
+  std::uint8_t multiturn_bits = 0;   ///< Number of bits of the turns; 0: none.
   bool multiturn_first = true;       ///< Whether the turns precede the position.
-  std::uint8_t position_bits = 0;    ///< Bits of a linear position; 0: rotary encoder.
+  std::uint8_t position_bits = 0;    ///< Number of bits of a linear position; 0: rotary encoder.
   std::int64_t unit_pm = 0;          ///< Picometres per count of a linear encoder; 0: not given.
 
   /// Returns the numbers of bits of position and turns, and their order.
@@ -68,8 +68,8 @@ struct WordSettings : Format {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};
   }
-  /// Returns the protocol format with its position word: the word that the user gave in `values`, or else `described`.
-  /// `linear`: whether `described` is the word of a linear encoder.
+  /// Returns the format of the protocol, with the position word that the user gave in `values`, or else the word
+  /// `described`. `linear`: whether `described` is the word of a linear encoder.
   [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
     Format format = *this;
     format.word = values.has_word() ? values.word : described;

@@ -38,8 +38,8 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
-/// Kind of request. Its value is the number that the first byte adds to the encoder's address, but for zero and reset
-/// the second byte of the request.
+/// Kind of request. For position and turns, the value is the difference between the only byte of the request and the
+/// encoder's address; for zero and reset, it is the second byte of the request.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 /// A request to the encoder.
@@ -142,7 +142,7 @@ struct Protocol {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
-  /// Returns the time taken as the latch of the position: the end of the request.
+  /// Returns the assumed time at which the encoder latches the position: the end of the request.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the times of the virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {

@@ -85,8 +85,8 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   TextReply out_;
   unsigned rest_ = 0;  // number of bytes still to be received of a command `M`
   bool is_tampered_ = false;
-  bool busy_ = false;          // whether a transmission is in progress
-  bool sending_text_ = false;  // whether the transmission in progress is a text of `tamper`
+  bool busy_ = false;          // whether bytes are being sent to the host
+  bool sending_text_ = false;  // whether the bytes being sent are a text of `tamper`
 };
 
 /// Result of a command, with the name of its error.

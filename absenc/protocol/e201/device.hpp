@@ -30,7 +30,7 @@ class VirtualInterface final : public author::Responder {
 
   Format format_;
   const Shaft* shaft_;
-  // encoder behind the interface; if it is an SSI encoder, only the supply of this object is used
+  // BiSS encoder behind the interface; in place of an SSI encoder, this object only stores whether the supply is on
   biss::Encoder encoder_;
   unsigned clock_ = 4;  // number of the MA clock, 1 to 8; 4 is 280 kHz
   unsigned width_;      // width of the position in bits, which `b` returns

@@ -36,7 +36,7 @@ inline constexpr std::uint8_t clear_zero = 'a';  ///< Command that removes the z
 inline constexpr std::uint8_t hexadecimal = '>';
 inline constexpr std::uint8_t stream_on = '1';   ///< Command that starts the stream of positions.
 inline constexpr std::uint8_t stream_off = '0';  ///< Command that ends the stream of positions.
-/// Command that sets the MA clock, followed by 1 to 8.
+/// Command that sets the MA clock; the number of the clock, 1 to 8, follows it.
 inline constexpr std::uint8_t set_clock = 'M';
 inline constexpr std::uint8_t clock = 'm';  ///< Command that reads the number of the MA clock.
 /// Command that reads the width of the position in bits.
@@ -103,7 +103,8 @@ struct Format {
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// Returns whether the position word is usable, and the shortest frame fits into 64 samples.
+/// Returns whether the word has a position, its position and turns have at most 64 bits together, and the shortest
+/// frame fits into 64 samples.
 [[nodiscard]] constexpr bool fits(const Format& format) {
   const bool is_biss = format.carries == Carries::biss;
   return is_usable(format.word) &&

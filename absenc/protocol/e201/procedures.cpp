@@ -43,7 +43,8 @@ Procedure read(Dialog& dialog, InterfaceResults& found) {
   if (!reply) co_return {reply.error()};
   found.samples = reply->samples;
   found.reading = Protocol::reading(dialog.format(), {letter::samples}, *reply);
-  found.reading.latched = dialog.sent_at();  // assumed: no document states when the encoder latches the position
+  // The end of the request is taken as the time of the latch, because no document states this time.
+  found.reading.latched = dialog.sent_at();
   found.reading.received = dialog.received_at();
   co_return done;
 }

@@ -222,7 +222,8 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// The limit is the greater of 0.02 degrees (29 counts of 19 bits) and one count.
+// The command set-zero refuses if two positions differ by more than 0.02 degrees (29 counts of 19 bits) and more than
+// one count.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;

@@ -16,7 +16,8 @@ using testing::says;
 using testing::Tamper;
 using testing::TextReply;
 
-// At most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7 (22) are too fast.
+// Besides the other bits of a frame, the 64 samples have room for 20 bits of ACK, so clocks 8 (45 bits of ACK) and 7
+// (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
   bench.raw("M7\r");
@@ -47,7 +48,8 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // The delay of 905 ns is about a whole number of periods at 1100, 2200 and 4400 kHz.
+  // The line's delay of 905 ns is about a whole number of clock periods at 1100, 2200 and 4400 kHz, so the interface
+  // samples bits there while they change.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);

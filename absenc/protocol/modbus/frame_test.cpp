@@ -62,7 +62,7 @@ TEST(ModbusFrame, ExplainsEachRefusalCode) {
 }
 
 TEST(ModbusTiming, SilencesShrinkWithCharactersUpTo19200) {
-  EXPECT_EQ(frame_silence({.rate = 2400}), Time(14'583'334));  // 3.5 characters of 10 bits
+  EXPECT_EQ(frame_silence({.rate = 2400}), Time(14'583'334));  // 3.5 characters of 10 bits at 2400 baud
   EXPECT_EQ(character_gap({.rate = 2400}), Time(6'250'000));
   EXPECT_EQ(frame_silence({.rate = 19'200}).count() / 1000, 1822);
   EXPECT_EQ(frame_silence({.rate = 57'600}), Time(1'750'000));

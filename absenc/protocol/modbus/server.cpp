@@ -71,7 +71,8 @@ void Server::feed(const ByteEvent& event) {
 
 void Server::receive(const ByteEvent& event) {
   if (transmitting_) {
-    // Bytes received during one transmission break the rule at most once, not once for each byte.
+    // Bytes that are received during one transmission of this server break `turn_rule` at most once, not once for each
+    // byte.
     if (!expects_collision_ && !interrupted_ && !ended_late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;

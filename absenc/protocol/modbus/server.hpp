@@ -69,7 +69,7 @@ class Server : public Device<std::uint8_t> {
   bool follows_traffic_ = false;  // the length of the silence before the present frame is known, so it is checked
   bool began_too_soon_ = false;   // the silence before the present frame was shorter than 3.5 characters
   bool has_gap_ = false;          // two characters of the present frame were further apart than `character_gap`
-  bool line_was_used_ = false;    // anything was received or sent since power on
+  bool line_was_used_ = false;    // this server has received or sent something since power on
   // The silence after the last frame was reported so late that the client may have timed out.
   bool ended_late_ = false;
   bool expects_collision_ = false;

@@ -68,8 +68,8 @@ class VirtualEncoder final : public author::Responder {
       take_turn(one * address(), one * encoder_count);
     }
     if (!is_reset(request->code)) resets_.end();
-    // The reply to a request of a reset or to command code 20 (give an address) has the address and the alarms from
-    // before the reset or the new address.
+    // The reply to a request of a reset, or to command code 20 (give an address), shows address and alarms as they were
+    // before this request.
     const OneReply before{.address = address(), .status = status(at), .data = data_for(*request, at)};
     reply.append(encode_reply(request->code, before).view());
     if (is_reset(request->code)) count_reset(*request, at);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of the values in frames of Nikon's A-format.
+// Names, units of measure and meanings of the values in frames of Nikon's A-format.
 #pragma once
 
 #include <array>

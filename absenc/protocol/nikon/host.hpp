@@ -12,7 +12,7 @@ namespace absenc::nikon {
 /// 3).
 class ReadPosition : public author::HostOf<Protocol> {
  public:
-  /// Creates a conversation that reads from an encoder of this format with `request`.
+  /// Creates a conversation that sends `request`, which asks for a position, to an encoder of this format.
   explicit ReadPosition(const Format& format, const Request& request) : HostOf(format), position_request_(request) {
     author::Manner manner = Protocol::manner(format, request);
     manner.repeats = 0;

@@ -15,7 +15,8 @@ using testing::Numbers;
 using testing::wire;
 using testing::Wire;
 
-// Returns a function that replaces the encoder's replies with the numbers `from` to `to` - 1 by `reply`.
+// Returns a function that puts `reply` in place of each reply of the encoder whose number, counted from 0, is at least
+// `from` and less than `to`.
 testing::Tamper replace(unsigned from, unsigned to, Wire reply) {
   return [=](unsigned index, Wire& bytes) {
     if (index >= from && index < to) bytes = reply;

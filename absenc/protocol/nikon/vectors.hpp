@@ -13,7 +13,7 @@ using author::VectorText;
 
 /// Source of the replies that HPMicro's two sample boards exchange.
 inline constexpr std::string_view sei_sample = "hpm_sdk, samples/drivers/sei/master/nikon/README_en.md";
-/// Source of a reply of an encoder with 17 bits; the picture shows the reply's four fields and its CRC.
+/// Source of a reply of an encoder with 17 bits: a picture that shows the reply's four fields and its CRC.
 inline constexpr std::string_view ti_sample = "motor-control-sdk, nikon_sample_output.png";
 
 /// Test frames of the A-format, each with its decoded fields or with the error that decoding gives.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An SSI format that is chosen once and then decodes many words, compiled.
+// An SSI format that is compiled once, so that it then decodes many words fast.
 #pragma once
 
 #include "absenc/protocol/compiled_word.hpp"
@@ -29,7 +29,8 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes readings that the compiled word cannot decode: extra clocks, another number of bits, or an error.
+  // Decodes readings that the compiled word cannot decode: those with extra clocks, another number of bits, or an
+  // error.
   [[nodiscard, gnu::noinline]] constexpr Result<Word> decode_otherwise(const BitView& bits) const {
     return ssi::decode(format_, bits);
   }

@@ -27,8 +27,8 @@ class VirtualEncoder final : public author::ClockedDevice {
   Format format_;
   const Shaft* shaft_;
   Word latched_{};
-  // Number of clocks since the word `latched_` was stored; modulo two words if the host clocks again within the
-  // monoflop time.
+  // Number of clocks since the word `latched_` was stored. If the host clocks again within the monoflop time, the
+  // number is first reduced modulo the number of bits of two words.
   std::size_t shifted_ = 0;
   Time free_at_{};  // end of the monoflop time after the last clock
 };

@@ -78,8 +78,8 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // If a bit before the last `word` bits is 1, the number read is greater than any position: `word` is the number of
-  // bits of a position word.
+  // The bits before the last `word` bits are the high bits of the number that was read. If one of them is 1, the number
+  // is greater than any position word.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
@@ -170,8 +170,8 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
 /// Whether a word has an error bit, and the level of the bit that reports an error.
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
-/// Returns the tree format: turns in `turns` bits, then the position in `steps` bits, both filled up with zeros; an
-/// empty format if turns or position have more bits.
+/// Returns the tree format: turns in `turns` bits, then the position in `steps` bits, both filled up with zeros.
+/// Returns an empty format if the encoder's turns have more than `turns` bits, or its position more than `steps` bits.
 [[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
   WordFormat word;
   const auto fill = [&word](unsigned count) {

@@ -29,7 +29,8 @@ struct RawHost final : sim::testing::RawHost {
   explicit RawHost(Wire request, Time at = {}) : sim::testing::RawHost(std::move(request), 100us, 12us, at) {}
 };
 
-/// Returns a fault that replaces the encoder's replies with the numbers `from` to `to` - 1 by refusals.
+/// Returns a function that puts a refusal in place of each reply of the encoder whose number, counted from 0, is at
+/// least `from` and less than `to`.
 inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   return [=](unsigned index, Wire& reply) {
     if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});

@@ -240,8 +240,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // If the turn counter overflows and turns back before the next call of this function, it does not detect the
-    // overflow.
+    // This function reads the turn counter only when it is called: it does not detect an overflow if the counter turns
+    // back before the next call.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;

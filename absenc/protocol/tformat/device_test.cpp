@@ -309,8 +309,8 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 0u);
   EXPECT_EQ(ask(thrice), 2u);
   EXPECT_EQ(ask(thrice), 4u);
-  // After it has received a single request, the encoder excuses three requests that arrive late and together: the host
-  // may have waited for each reply.
+  // After a single request, three requests that arrive late and together do not count as violations: the host may have
+  // waited for each reply.
   EXPECT_EQ(ask(once), 4u);
   EXPECT_EQ(ask(thrice), 4u);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of the values in T-format frames and results.
+// Names, units of measure and meanings of the values in T-format frames and in results of procedures.
 #pragma once
 
 #include <array>
@@ -64,8 +64,8 @@ struct Values {
   std::optional<bool> overheat_enabled{};
   std::optional<std::uint8_t> overheat_threshold{};  ///< Temperature above which over_heat is raised, in degC.
   std::optional<bool> written{};  ///< True if the memory byte was written; false if it had the value already.
-  /// Memory page that a procedure has left selected, or may have left selected, if it may differ from the page that was
-  /// selected before.
+  /// Memory page that is or may be selected after a procedure; no value: the page from before the procedure is selected
+  /// again.
   std::optional<std::uint8_t> page_left{};
 };
 

@@ -386,8 +386,8 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// Returns how often and when a request is repeated. After a page change without a valid reply it waits, because the
-  /// change may still be in progress.
+  /// Returns how often, and after which pause, a host repeats a request. After a page change without a valid reply the
+  /// host waits for `memory_time`, because the change may still be in progress.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};

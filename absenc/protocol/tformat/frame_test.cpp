@@ -62,7 +62,8 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
       const Error error = decode_reply(format, {DataId::everything}, bad).error();
       if (error != Error::bad_checksum) ++crc_passes;
       if (error == Error::none) ++strict_passes;
-      // The count `lax_passes` allows any value of the upper four bits of the status field (SF).
+      // `lax_passes` counts the two-bit errors that neither the CRC nor the other checks detect, if these ignore the
+      // upper four bits of the status field (SF) and compare no redundant values.
       bad[1] &= 0x0F;
       bad[10] = checksum(bad.view().first(10));
       const Error fixed_bits = decode_reply(format, {DataId::everything}, bad).error();

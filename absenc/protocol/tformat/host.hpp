@@ -13,14 +13,14 @@ namespace absenc::tformat {
 /// needs alarms that the reply does not report. `known_alarms`: alarms (ALMC) of a reply to ID 3 since power on.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
-  /// Creates a conversation that reads from an encoder of this format with data ID `id`.
+  /// Creates a conversation that uses the data ID `id` to read from an encoder of this format.
   explicit ReadPosition(const Format& format, DataId id = DataId::everything,
                         std::optional<std::uint8_t> known_alarms = std::nullopt)
       : HostOf(format), id_(id), known_alarms_(known_alarms) {
     const bool alarms_first = (id == DataId::singleturn || id == DataId::multiturn) && !known_alarms;
     ask_for(alarms_first ? DataId::everything : id);
   }
-  /// Creates a conversation that reads from an encoder of this format with the data ID of `request`.
+  /// Creates a conversation that uses the data ID of `request` to read from an encoder of this format.
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {

@@ -111,7 +111,8 @@ TEST(TformatProcedures, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// Bit 7 enables the threshold, from 1 degC on; with bit 7 clear it is off (7.2.4, 7.4).
+// Memory byte of the over-heat threshold: bit 7 enables the threshold, which must then be 1 degC or more; with bit 7
+// clear the threshold is off (7.2.4, 7.4).
 TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
@@ -140,7 +141,7 @@ TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-// Without faults, the requests are page select, read, write, page select, read.
+// Without faults, the command memory-write sends the requests page select, read, write, page select, read.
 TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;

@@ -255,7 +255,7 @@ Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments argu
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
-      // The index of a text is the value of the bits ca1 and ca0 of the status field (SF).
+      // Cause of a refusal in words, by the value (0 to 3) of the bits ca1 and ca0 of its status field (SF).
       "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
       "wrong, or an address that is closed",
       "ca0: it received the request with a parity error of the data ID",
