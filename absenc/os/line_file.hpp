@@ -16,7 +16,8 @@ class OutputFile {
  public:
   /// Waits until the content is on the disk, if the file system can do that. Throws Failure.
   void sync();
-  /// Throws Failure if the file has its name, but the path no longer leads to it, or another program has cut it.
+  /// Throws Failure if the path of the file, once the file has this name, no longer leads to it, or if another program
+  /// has shortened the file.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }

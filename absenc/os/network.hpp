@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Network helpers for senders: computer names, waiting for a socket, UDP to one address.
+// Network functions for sending by MQTT and UDP: names of computers, waiting for a socket, UDP to one address.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ namespace absenc::os {
 /// Replaces this process by another program, which is told that its name is `name`. Throws Failure.
 [[noreturn]] void become_program(const std::string& path, const std::string& name, std::span<char* const> words);
 
-/// Loads a plug-in, which stays loaded, and returns its symbol. Throws Failure.
+/// Loads the plug-in at `path`, which stays loaded, and returns the address of its symbol `symbol`. Throws Failure.
 [[nodiscard]] const void* load_symbol(const std::string& path, const char* symbol);
 
 }  // namespace absenc::os

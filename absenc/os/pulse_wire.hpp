@@ -20,7 +20,7 @@ struct PulseWire {
   std::optional<Time> width{};  // pulse width chosen by the user; empty: that of the protocol
 };
 
-/// The wires of ExtraWire::trigger and ExtraWire::clear.
+/// The user's choice of the wires for the pulses ExtraWire::trigger and ExtraWire::clear.
 struct PulseWires {
   PulseWire trigger{};
   PulseWire clear{};

@@ -26,7 +26,8 @@ void sleep_until(Time time) {
 }
 
 void reach(Time time) {
-  // The kernel may wake a sleeping thread about this much too late, so the clock is polled for this last time.
+  // The kernel may wake a sleeping thread too late by about this time, so the thread sleeps less by it and then polls
+  // the clock.
   constexpr Time wake_up = std::chrono::microseconds(100);
   if (time - now() > wake_up) sleep_until(time - wake_up);
   while (now() < time) {

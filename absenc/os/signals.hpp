@@ -54,7 +54,7 @@ struct Ready {
 
 /// A descriptor that `wait_for` watches.
 struct Watched {
-  int descriptor = -1;  // -1: is not watched
+  int descriptor = -1;  // descriptor to be watched; -1: none
   Ready wanted{.to_read = true};
   Ready ready{};  // set by `wait_for`; `to_read` also if it was not wanted but the other end is closed
 };

@@ -182,7 +182,7 @@ void SlcanAdapter::queue_frame(Bytes line, Time at) {
   waiting_.push_back(*frame);
 }
 
-// Reports at most one frame of the host per call, so that the device can send its own frame between two.
+// Reports at most one frame of the host per call, so that the device can send a frame between two frames of the host.
 bool SlcanAdapter::reach(Time now) {
   if (waiting_.empty() || bus_free_ > now) return false;
   push(waiting_.front(), bus_free_);

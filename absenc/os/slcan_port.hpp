@@ -93,7 +93,7 @@ class SlcanAdapter final : public SlcanLine {
   bool listen_only_ = false;
   bool with_time_ = false;
   std::deque<CanFrame> waiting_;  // queued frames of the host; the first frame is being sent on the bus
-  Time bus_free_{};               // end of the frame that is being sent on the bus, or was sent last
+  Time bus_free_{};               // time at which the frame on the bus, or the last one, ends
   std::uint64_t lost_ = 0;
   std::uint64_t overflowed_ = 0;
   std::uint64_t garbage_ = 0;

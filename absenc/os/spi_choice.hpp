@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SPI modes, and what a user may set of a port that clocks.
+// SPI modes, and the user's choice of clock rate and SPI mode for a port that clocks.
 #pragma once
 
 #include <cstdint>

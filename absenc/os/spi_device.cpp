@@ -15,7 +15,7 @@ namespace {
 // time for which the chip is deselected between two transfers of a message
 constexpr Time deselected_time = std::chrono::microseconds(10);
 
-// Greatest number of bytes of one selection that are passed to the device; no device reads more.
+// Greatest number of bytes that are passed to the device after each selection of the chip; no device reads more.
 constexpr std::size_t most_received = 4096;
 
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }
@@ -136,7 +136,8 @@ void SpiDevice::run_device(Time now) {
   }
 }
 
-// In modes 2 and 3 the clock line idles high, and a clocked device (SSI, BiSS) sees the same edges.
+// A clocked device (SSI, BiSS) works in mode 2 and in mode 3: the clock line idles high, and the device sees the same
+// edges in both.
 bool SpiDevice::suits(std::uint8_t mode) const {
   return carries_bits(kind_) ? idles_high(mode) : mode == settings_.spi_mode;
 }

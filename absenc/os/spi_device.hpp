@@ -20,7 +20,8 @@ struct SpiTransfer {
   std::uint8_t mode = 0;   // SPI mode: 2 * CPOL + CPHA
   bool lsb_first = false;
   Time delay{};  // pause after the last bit of the transfer
-  // the chip is deselected after `delay`; in the last transfer of a message, the chip stays selected
+  // whether the chip is deselected after `delay`, before the next transfer; in the last transfer of a message, whether
+  // the chip stays selected
   bool deselect = false;
 };
 

@@ -24,7 +24,7 @@ struct SpidevReply {
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
-  std::vector<std::uint8_t> bytes{};  // bytes that the program reads
+  std::vector<std::uint8_t> bytes{};  // content of the ranges `out`, or the bytes that read(2) gives to the program
   Time at{};  // earliest time for the reply to the program: the end of the SPI message if there was one
 };
 

@@ -34,7 +34,8 @@ void StreamPort::begin(const ByteStep& step) {
 }
 
 void StreamPort::transfer(const ByteStep& step) {
-  // Most transfers are due already; the first comparison shows this without reading the clock.
+  // Most transfers are due already. The comparison with the time that the state machine knows shows this without
+  // reading the clock.
   if (step.at > waiting_.known_time() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   std::span<const std::uint8_t> out = step.out;
   for (; step.frame != 0 && out.size() > step.frame; out = out.subspan(step.frame)) {

@@ -85,7 +85,7 @@ class StreamPort : public Port<std::uint8_t> {
   bool read_at_once_ = false;
 
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};  // end of the last transfer or pulse
+  Time sent_at_{};  // time at which the last transfer or pulse ends
   Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;

@@ -34,7 +34,7 @@ class TransferPort : public Port<std::uint8_t> {
     std::vector<std::uint8_t> items{};
     std::size_t bits = 0;   // number of bits of a clocked link
     bool idle_low = false;  // whether the data line was low in all idle clocks; false if there were none
-    Time at{};              // end of the transfer; it may have ended earlier by up to `late`
+    Time at{};              // time at which the transfer ended; it may have ended up to `late` earlier
     Time late{};
   };
 

@@ -17,7 +17,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time wakeup_interval = 1ms;
-// Time between two bytes: the kernel's worker threads must have slept before each of them.
+// Time between two bytes that are sent through a pseudo-terminal. The kernel's worker thread that delivers a byte must
+// have slept before, because only then does the byte show how late the thread wakes up.
 constexpr Time byte_interval = 5ms;
 // More pseudo-terminals see a delay sooner: the kernel's worker threads are late independently of each other.
 constexpr std::size_t loop_count = 4;

@@ -21,7 +21,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Stops a process with a DelayWatch for 60 ms or more; returns 0 if it measured at least 50 ms.
+// Starts a process in which a DelayWatch runs, and stops it for 60 ms or more. Returns 0 if the DelayWatch then
+// measures a delay of at least 50 ms.
 int measured_while_stopped(bool terminals) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -33,7 +34,8 @@ int measured_while_stopped(bool terminals) {
   }
   int status = 0;
   ::waitpid(child, &status, WUNTRACED);
-  // 60 ms instead of 50: the DelayWatch may have begun a sleep of 1 ms before the process stopped
+  // The process is stopped for 60 ms, so that at least 50 ms are measured: a sleep of 1 ms, which the DelayWatch had
+  // begun before the stop, does not count.
   sleep_until(now() + 60ms);
   ::kill(child, SIGCONT);
   ::waitpid(child, &status, 0);
@@ -49,7 +51,8 @@ TEST(DelayWatch, MeasuresHowLongTheProcessStoodStill) {
 std::set<std::string> open_slaves() {
   std::set<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    std::error_code closed;  // a descriptor may be closed before its link is read
+    // reading the link of a descriptor fails if the descriptor was closed meanwhile
+    std::error_code closed;
     const std::string path = std::filesystem::read_symlink(entry.path(), closed);
     if (path.starts_with("/dev/pts/")) paths.insert(path);
   }

@@ -128,8 +128,8 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // This call discards unread bytes, so it comes before requests are read: the replies to these must not be
-  // discarded.
+  // `users_changed` discards the bytes that the previous program on the terminal did not read. It is called before
+  // requests are read, so that it cannot discard the replies to them.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {
@@ -174,7 +174,7 @@ void EmulatorPort::drop_client(int descriptor) {
 
 void EmulatorPort::accept_client() {
   Descriptor client(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-  // At the limit of TCP clients the connection is closed at once.
+  // If there are as many TCP clients as permitted, the new connection is closed at once.
   if (!client || clients_.size() == most_clients) return;
   const int on = 1;
   ::setsockopt(client.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);

@@ -47,7 +47,8 @@ TEST(EmulatorPort, TalksToASerialPort) {
   SerialPort host(device.path(), fast);
   host.begin(transfer(request));
   EXPECT_EQ(receive(device), request);
-  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // 0.2 ms after the gap limit the frame ends
+  // The port adds its latency of 0.2 ms to the gap limit of 1 ns, and then reports that the frame has ended.
+  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);
   const Data reply{1, 2, 3};
   device.begin(transfer(reply));
   EXPECT_EQ(receive(host), reply);
@@ -104,7 +105,7 @@ TEST(EmulatorPort, IsOneLineForAllItsEnds) {
     EXPECT_EQ(receive(second), reply);
   }
   expect_quiet(device);  // the port also notices here that the TCP client `second` has closed its connection
-  // twice, because the first write to a connection that the other side has closed succeeds
+  // The test sends twice, because the first write to a connection that the other side has closed still succeeds.
   for (int i = 0; i < 2; ++i) {
     device.begin(transfer(request));
     EXPECT_EQ(receive(first), request);

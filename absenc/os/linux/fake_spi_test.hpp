@@ -66,7 +66,7 @@ class FakeSpi final : public SpiKernel {
 
   std::map<unsigned long, int> refusals;  // errno with which requests of ioctl fail, by request number
   int open_error = 0;
-  std::uint32_t mode_mask = ~0u;  // the controller accepts SPI mode bits outside this mask, but ignores them
+  std::uint32_t mode_mask = ~0u;  // SPI mode bits that have an effect; others are accepted, but ignored
   std::uint32_t highest_speed = ~0u;
   int missing = 0;       // number of bytes by which the result of a message is too short
   bool shorted = false;  // whether the data line is shorted to low

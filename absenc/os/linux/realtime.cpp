@@ -51,8 +51,8 @@ bool has_capability(unsigned capability) {
 
 // Locks all memory. Returns 0 or a value of errno.
 int lock_all(rlim_t limit) {
-  // With a limit, the kernel would refuse later memory instead of not locking it: a new thread or a large vector
-  // would fail.
+  // With a finite limit of locked memory, the kernel would refuse memory that is requested later instead of leaving it
+  // unlocked: a new thread or a large vector would fail.
   if (limit != RLIM_INFINITY && !has_capability(CAP_IPC_LOCK)) return EPERM;
   // MCL_ONFAULT locks later pages when they are used: the whole stacks of later threads would cost 8 MB each.
   return ::mlockall(MCL_CURRENT) == 0 && ::mlockall(MCL_FUTURE | MCL_ONFAULT) == 0 ? 0 : errno;
@@ -79,8 +79,8 @@ void lock_memory() {
 
 void require_realtime(int priority) {
   thread_local int present = 0;
-  // The kernel is asked, too, because the thread of a forked process is no real-time thread, although its parent was
-  // one.
+  // `present` alone does not suffice: a forked process inherits its value, although the thread of that process is no
+  // real-time thread for the kernel.
   if (priority <= present && ::sched_getscheduler(0) == policy) return;
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);

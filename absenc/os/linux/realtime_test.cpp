@@ -49,7 +49,8 @@ std::string in_child(const std::function<std::string()>& work) {
   return text;
 }
 
-// Removes a capability of this process and sets a resource limit, so that the kernel refuses real-time even to root.
+// Removes a capability of this process and sets a resource limit, so that the kernel refuses real-time scheduling or
+// locked memory even to root.
 void give_up(unsigned capability, __rlimit_resource resource, rlim_t most = 0) {
   __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
   std::array<__user_cap_data_struct, 2> data{};
@@ -88,7 +89,8 @@ bool kernel_allows() {
   return allowed == "yes";
 }
 
-// Expects that `work` returns `expected`; on a test machine whose kernel refuses real-time, expects that refusal.
+// Expects that `work` returns `expected`; on a test machine whose kernel refuses real-time scheduling or locked memory,
+// expects that refusal.
 void expect_or_refused(const std::string& expected, const std::function<std::string()>& work) {
   const std::string result = in_child(work);
   if (kernel_allows()) {
@@ -186,7 +188,8 @@ TEST(RealTime, RefusedLockHasThreePartsAndLeavesThreadAsItWas) {
   }
 }
 
-// With a finite limit mlockall(2) may succeed, and then the kernel would refuse later memory.
+// With a finite limit of locked memory mlockall(2) may succeed, but the kernel would then refuse memory that the
+// process requests later.
 TEST(RealTime, FiniteLimitOfLockedMemoryIsRefused) {
   const std::string text = in_child([] {
     give_up(CAP_IPC_LOCK, RLIMIT_MEMLOCK, 64 << 20);

@@ -84,7 +84,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
                     "RTS cannot switch the direction of RS-485 and carry pulses: use DTR or a GPIO line for them");
     }
     if (use == SerialUse::receive) {
-      const int rts = TIOCM_RTS;  // the kernel set RTS when the port was opened
+      const int rts = TIOCM_RTS;  // RTS is cleared: the kernel set it when the port was opened
       ::ioctl(descriptor(), TIOCMBIC, &rts);
     } else {
       set_direction(uses_rts(wires) ? Rs485::off : rs485);
@@ -126,7 +126,7 @@ void SerialPort::apply(const LineSettings& settings) {
                                                   "-bit characters: decode a capture, or emulate with sim:");
   }
   const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
-  if (!set) fail(errno);  // the port may disappear between two calls
+  if (!set) fail(errno);  // the adapter may have been unplugged since the port was opened
   const LineSettings given = *set;
   line_ = settings;
   if (is_gadget(path_)) return;
@@ -175,8 +175,8 @@ void SerialPort::set_direction(Rs485 rs485) {
 }
 
 void SerialPort::shorten_latency() {
-  // Over a pseudo-terminal, the host's and the encoder's process must be scheduled: a latency of 2 ms gave false
-  // timeouts.
+  // The latency of a pseudo-terminal includes the time until the processes of host and encoder are scheduled: with 2
+  // ms, replies in time were reported as timeouts.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

@@ -90,7 +90,7 @@ Failure in_use(const std::string& path) {
                                                              : Holder::program;
     return {what + holder + ": end it, or use another port", who};
   }
-  // The message does not advise to end the server, because the server may read this encoder for several clients.
+  // The message does not advise to end `absenc serve`, because it may read this encoder for several clients.
   const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
   const std::string page = page_of_server(path, process);
   const std::string where =
@@ -144,7 +144,8 @@ std::optional<unsigned> latency_timer(const std::string& terminal, const fs::pat
 
 std::string driver_of(const std::string& terminal, const fs::path& sys) {
   std::error_code error;
-  // Since Linux 6.5 two devices lie between a terminal and its UART (serial_base_bus.c).
+  // Since Linux 6.5 two more devices, `port` and `ctrl`, lie in /sys between a terminal and its UART
+  // (serial_base_bus.c).
   for (fs::path device = fs::canonical(sys / terminal / "device", error); !error; device = device.parent_path()) {
     const std::string driver = fs::canonical(device / "driver", error).filename();
     if (error || (driver != "port" && driver != "ctrl")) return driver;

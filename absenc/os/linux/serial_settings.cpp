@@ -15,7 +15,7 @@ namespace {
 
 static_assert(sizeof(termios2) == sizeof(TerminalState));
 
-// Flags of 5, 6, 7 and 8 data bits.
+// Flags of termios for 5, 6, 7 and 8 data bits in a character.
 constexpr std::array<tcflag_t, 4> sizes{CS5, CS6, CS7, CS8};
 
 void write_line(termios2& state, const LineSettings& settings) {

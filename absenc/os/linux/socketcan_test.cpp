@@ -217,7 +217,8 @@ TEST(SocketCan, KernelStampIsTimeOfReception) {
     ASSERT_EQ(system_can_kernel().read(socket.get(), received, stamp), static_cast<ssize_t>(sizeof frame));
     EXPECT_EQ(received.can_id, 0x120u);
     const StampedTime time = stamps.convert(stamp, before_read, read_clocks());
-    EXPECT_GE(time.at, before);  // holds whether the stamp is that of the arrival or that of the read
+    // These limits hold for a stamp of the frame's arrival and also for a stamp of the read.
+    EXPECT_GE(time.at, before);
     EXPECT_LE(time.at - time.late, after);
     has_good_stamp = stamp.has_value() && time.late < 1ms;
   }
@@ -235,7 +236,8 @@ TEST(SocketCan, FrameHasTimeOfKernelStamp) {
   EXPECT_GE(event.at, before - 3ms);
   EXPECT_LE(event.at - event.late, after - 3ms);
   EXPECT_GT(event.late, Time{});
-  EXPECT_LT(event.late, 2ms);  // `late` is mostly below 1 us; 2 ms allows for a busy machine
+  // `late`, the uncertainty of the frame's time, is mostly below 1 us; 2 ms allows for a busy machine
+  EXPECT_LT(event.late, 2ms);
 }
 
 TEST(SocketCan, FrameHasTimeOfReadAndItsUncertaintyIfClockWasSet) {

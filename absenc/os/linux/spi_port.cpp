@@ -22,7 +22,7 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr std::uint8_t word_bits = 8;  // the word length that nearly every controller supports
+constexpr std::uint8_t word_bits = 8;  // bits of an SPI word; nearly every controller supports 8
 
 std::string reason(int error) { return " (" + std::generic_category().message(error) + ")"; }
 

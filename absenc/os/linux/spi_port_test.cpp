@@ -193,7 +193,7 @@ TEST_F(SpiPortTest, ReportsRefusedMode) {
             "the controller of /dev/spidev0.0 refused SPI mode 3 (Invalid argument): swap the two wires of the clock "
             "pair and set spi_mode=1, or use another controller");
   kernel.refusals.clear();
-  kernel.mode_mask = SPI_CPHA;  // the controller accepts SPI mode bits outside this mask, but ignores them
+  kernel.mode_mask = SPI_CPHA;  // the controller accepts SPI_CPOL, but ignores it
   EXPECT_THAT(refusal(Kind::unsupported, LinkKind::clocked, biss_settings), HasSubstr("refused SPI mode 3"));
 }
 

@@ -152,7 +152,8 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// The list is checked in each call: another thread of the calling program may change the list between two calls.
+// The list of transfers is checked in each call, because another thread of the calling program may change it between
+// two calls.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

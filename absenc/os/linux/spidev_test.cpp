@@ -161,7 +161,8 @@ TEST_F(SpidevTest, RequestsTransfersThenTheirBuffers) {
 
 TEST_F(SpidevTest, RequestsChangedListAgain) {
   Data in = bytes_of(TransferFields{.tx_buf = 0x2000, .len = 5});
-  // the caller fetched a buffer of two bytes, but the list now names a buffer of five bytes
+  // CUSE has fetched two bytes from the buffer that the list of transfers named before; the list now names a buffer of
+  // five bytes.
   in.insert(in.end(), {1, 2});
   const SpidevReply reply = message(in, 1, 0);
   EXPECT_TRUE(reply.again);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In place of linux/cuse/spidev_node.cpp in programs that are built without libfuse.
+// Replaces linux/cuse/spidev_node.cpp in programs that are built without libfuse.
 #include "absenc/os/spidev_node.hpp"
 
 #include "absenc/os/error.hpp"
