@@ -143,7 +143,8 @@ bool Access::names_this_server(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // the header Origin, which would name another site, is missing
+  // Without the header Origin, nothing shows that a page of another site sent the request.
+  if (request.origin.empty()) return true;
   return equals_ignoring_case(request.origin, "http://" + request.host) ||
          equals_ignoring_case(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));

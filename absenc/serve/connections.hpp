@@ -18,7 +18,7 @@ class Connections {
   static constexpr std::size_t most = 480;
   // Greatest number of those `most` connections that one IP address may have, so that other addresses have room, too.
   static constexpr std::size_t most_of_address = 384;
-  // greatest number of connections in the reserve; these carry vital requests only
+  // greatest number of connections in the reserve; these carry only vital requests: health check and metrics
   static constexpr std::size_t reserve = 32;
   // Time within which a connection must send a complete request, even if bytes still arrive.
   static constexpr Time request_time = std::chrono::seconds(10);
@@ -34,7 +34,7 @@ class Connections {
   /// Records that a whole request was received: the connection is not idle until `await_request` is called.
   void begin_request(Id id);
   void await_request(Id id, Time now);
-  /// Returns whether the connection belongs to the reserve, which serves vital requests only.
+  /// Returns whether the connection belongs to the reserve, which serves only vital requests: health check and metrics.
   [[nodiscard]] bool is_in_reserve(Id id) const;
   /// Closes connections that have waited for a complete request for longer than `request_time`.
   void end_incomplete_requests(Time now);

@@ -245,7 +245,7 @@ class MqttProcess {
   Broker broker_{};
   MqttVersion version_ = MqttVersion::v5;
   mosquitto* client_ = nullptr;
-  // Numbers that the parent process has given messages; the keys are the numbers that libmosquitto has given them.
+  // Numbers that the parent process has given to messages; the keys are libmosquitto's numbers of the messages.
   std::unordered_map<int, std::uint32_t> numbers_{};
   os::Ready broker_ready_{};
   Time next_sign_of_life_{};
@@ -261,7 +261,7 @@ int run_mqtt_process() {
     MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
     return 0;
   } catch (const std::exception&) {
-    return 1;  // no message is needed: the parent process detects that this process has ended
+    return 1;  // the error is not reported, because the parent process detects that this process has ended
   }
 }
 

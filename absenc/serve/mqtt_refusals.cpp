@@ -31,7 +31,8 @@ void MqttRefusals::sent(const std::string& topic) {
 
 bool MqttRefusals::refuse(const std::string& topic, const std::string& why, Time now) {
   suspect_is_out_ = false;
-  suspects_.erase(topic);  // a topic that the broker has refused is no suspect any more
+  // A topic that the broker has refused is no longer suspected of making the broker close the connection.
+  suspects_.erase(topic);
   const auto [place, is_new] = refused_.try_emplace(topic);
   Refused& refused = place->second;
   const bool is_another = refused.why != why;

@@ -171,7 +171,7 @@ void MqttSender::step(MqttClient& client) {
   settle(client);  // acknowledgements that arrived before the connection was lost are handled, too
   if (!lost) return;
   note_death(client);
-  // a topic is suspected only if the client process lives: if it died, a packet was the cause
+  // Topics are suspected of ending the connection only if the client process lives: if it died, a packet was the cause.
   if (!client.died()) note_lost_connection();
   throw Failure(client.trouble());
 }
@@ -247,8 +247,8 @@ void MqttSender::send_values(MqttClient& client) {
   }
 }
 
-// Publishes a retained message unless its condition is unchanged. Returns whether the broker has the message or gets
-// it now.
+// Publishes a retained message, unless its Retained::condition is that of the last message of the topic. Returns
+// whether the broker has the message or gets it now.
 bool MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   const auto known = retained_.find(retained.topic);
   if (known != retained_.end() && known->second == retained.condition) return true;

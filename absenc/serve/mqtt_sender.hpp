@@ -80,7 +80,7 @@ class MqttSender {
   std::int64_t last_checked_id_ = 0;
   MqttRefusals refusals_;
   std::set<std::string> served_;                 // names of encoders that may have retained messages at the broker
-  std::map<std::string, std::string> retained_;  // condition of the retained message that was sent last, by topic
+  std::map<std::string, std::string> retained_;  // Retained::condition of the last sent message, by topic
   Time next_states_{};
   Time next_values_{};
   // whether the broker has acknowledged a spooled message since the connection was made

@@ -60,7 +60,8 @@ struct Server::Parts {
     publisher.request_stop();
     publisher.join();
     http.reset();  // the HTTP server ends before the parts that its requests use
-    fleet.end();   // ends before `distribute_events`, so that the events of the last commands are distributed, too
+    // the reading threads end first, so that `distribute_events` also distributes the events of their last commands
+    fleet.end();
     distribute_events();
     sending.change_to({});
   }
@@ -133,7 +134,8 @@ struct Server::Parts {
   Worker worker;
   std::optional<Api> api;
   std::optional<HttpServer> http;
-  std::set<std::string> traced;  // names of the encoders whose points are sent; used by the publisher thread only
+  // names of the encoders whose plot points the event streams send; used by the publisher thread only
+  std::set<std::string> traced;
   std::mutex mutex;
   std::condition_variable_any changed;
   std::jthread publisher;

@@ -3,6 +3,8 @@
 // byte order of this computer:
 //
 //   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body
+//
+// `arrived` shows whether the broker has acknowledged the message in the record.
 #pragma once
 
 #include <cstddef>
@@ -57,8 +59,8 @@ class SpoolFile {
     bool arrived = false;
   };
   /// Returns the next message at or after `offset` and moves `offset` behind it; nothing at the end of the file or at
-  /// a damaged record. Records that contain facts are skipped, and their facts stored in `facts` unless it is null.
-  /// Throws os::Failure.
+  /// a damaged record. Records that contain SpoolFacts instead of a message are skipped, and their content is stored in
+  /// `facts` unless it is null. Throws os::Failure.
   [[nodiscard]] std::optional<StoredMessage> next(std::size_t& offset, SpoolFacts* facts) const;
   /// Marks the message at `offset` as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;

@@ -28,7 +28,7 @@ class Streams {
 
   /// Sends a server-sent event to all streams.
   void send(std::string_view event, const client::Json& data);
-  /// Sends a server-sent event to the streams that trace `encoder`.
+  /// Sends a server-sent event to the streams that send the plot points of `encoder`.
   void send_traced(const std::string& encoder, std::string_view event, const client::Json& data);
 
   /// Removes streams whose client has disconnected.

@@ -12,7 +12,8 @@
 
 namespace absenc::serve {
 
-/// A point of a plot: continued position and speed, in degrees and rpm, or in mm and mm/s.
+/// A point of a plot: a position that continues past the end of a turn, and the speed, in degrees and rpm; for linear
+/// encoders in mm and mm/s.
 struct Point {
   std::int64_t at_ms = 0;  // calendar time of the reading, ms since 1970
   double place = 0;
@@ -63,7 +64,8 @@ class TimeSeries {
   void end_second();
   void add_point(const Point& point);
 
-  // the second that is being counted; its `at_s` is 0 if no second has begun since the last one ended
+  // the second whose readings and errors are being counted; its `at_s` is 0 if no second has begun since the last one
+  // ended
   Second second_{};
   std::deque<Second> seconds_;
   std::deque<Second> last_minute_;

@@ -70,16 +70,17 @@ struct Snapshot {
   State state = State::opening;
   Time age{};  // age of the last reading; before the first reading, time since the `Watch` was made
   bool has_reading = false;
-  std::optional<double> place{};  // last valid position, continued as in `Point`; degrees or mm
-  client::Sample last{};          // last reading; current only in state `live`
-  std::string message{};          // reason why the encoder is not live; "" if it is, or if none is known
+  // last valid position, which continues past the end of a turn; degrees, for linear encoders mm
+  std::optional<double> place{};
+  client::Sample last{};  // last reading; current only in state `live`
+  std::string message{};  // reason why the encoder is not live; "" if it is, or if none is known
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // number of times that `place` did not continue from the reading before it
+  std::uint64_t restarts = 0;  // number of readings at which `place` starts again, after a jump or a long pause
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
-  double rate = 0;           // rate of readings, per second
+  double rate = 0;           // measured number of readings per second
   LatencyFigures latency{};  // latencies of the replies, updated at most once a second
 };
 
