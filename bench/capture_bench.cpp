@@ -193,7 +193,7 @@ Cost plain_read(const File& file) {
       }
     }
   });
-  // prints depending on the sum of all samples, so that the compiler cannot omit its calculation
+  // the output depends on the sum of all samples, so the compiler cannot omit the calculation of the sum
   if (sum == 1) std::puts("");
   return cost;
 }

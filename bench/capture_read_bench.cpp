@@ -21,7 +21,9 @@ namespace {
 using namespace absenc::capture;
 
 constexpr std::size_t samples_size = 64 << 20;
-constexpr std::size_t piece_size = 4 << 20;  // bytes per piece of a sigrok session, as sigrok-cli writes them
+// number of bytes of samples in each of the files logic-1-1, logic-1-2 and so on, into which a sigrok session divides
+// its samples; the same as sigrok-cli writes
+constexpr std::size_t piece_size = 4 << 20;
 
 void require_that(bool condition) {
   if (!condition) std::abort();
@@ -130,7 +132,8 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// The run with which `raw_samples` is compared. It switches off the buffer of the C library.
+// The reference for the benchmark `raw_samples`: reads the same file by std::fread, without the buffer of the C
+// library.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();

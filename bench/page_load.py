@@ -16,7 +16,8 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 10
 UPDATES = float(sys.argv[2]) if len(sys.argv) > 2 else 30
 TICK = os.sysconf("SC_CLK_TCK")
 
-# The states of the page are stored as text, so that the measurement includes parsing them.
+# This script stores the replies to GET api/encoders, which the page shows, as text, so that the measurement includes
+# parsing them.
 RECORD = """
 const done = arguments[arguments.length - 1];
 (async () => {

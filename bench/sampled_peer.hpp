@@ -10,7 +10,7 @@
 
 namespace absenc::bench {
 
-/// Configuration of the decoder that is compared.
+/// Configuration of moteus' decoder, with which the library's decoder is compared.
 struct SampledPeer {
   unsigned pin;
   unsigned bits;  // number of bits of the encoder's position, up to 58

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tries every error of one to three bits of a good reply of each unit, and prints how many of them give another
-// position that no check of the unit notices, and the share of all replies that this is at three bit error rates
-// (docs/drive.md).
+// Inverts one to three bits of a good reply of each unit that is not on CAN, in every combination. Prints how many of
+// the damaged replies give another position although every check of the unit accepts them, and which share of all
+// replies these are at three bit error rates (docs/drive.md).
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace absenc;
 
-/// A reply of a vector with its request, and the options for both.
+/// Reply and request of a test vector of a unit, and the options with which both are decoded.
 struct Example {
   std::string_view id{};
   Options options{};
@@ -53,7 +53,8 @@ Options options_of(const Unit& unit, std::string_view text) {
   return options;
 }
 
-// Returns the vector whose reply has the widest valid position; no value on CAN, whose own checksum notices errors.
+// Returns the test vector of the unit whose reply has the valid position with the most bits. Returns no value for a
+// unit on CAN, because CAN's own checksum notices errors.
 std::optional<Example> example_of(const Unit& unit) {
   std::optional<Example> best;
   unsigned widest = 0;
@@ -127,7 +128,8 @@ int main() {
                 static_cast<unsigned long long>(found[2]));
     const bool is_none = found == std::array<std::uint64_t, 3>{};
     for (const double rate : {1e-6, 1e-5, 1e-4}) {
-      // if there is none, the chance of four or more wrong bits is a bound
+      // if every error of up to three bits is noticed, the share of replies with four or more wrong bits is an upper
+      // limit
       double share = is_none ? of_four(example->bits) * std::pow(rate, 4) : 0;
       for (unsigned errors = 1; errors <= found.size(); ++errors) {
         const double good = static_cast<double>(example->bits - errors);
