@@ -35,7 +35,8 @@ if(NOT ABSENC_HAS_CXX20)
   message(FATAL_ERROR "absenc needs a compiler for C++20 (g++ 12, clang 14 or newer), which ${CMAKE_CXX_COMPILER} is not.")
 endif()
 
-# Sets `result` to the libraries of these names as the linker is to find them: with ABSENC_STATIC the static ones.
+# Sets `result` to arguments of the linker for libraries that are given by name. With ABSENC_STATIC the arguments select
+# the static libraries (-l:libNAME.a).
 function(absenc_linked result)
   set(names ${ARGN})
   if(ABSENC_STATIC)

@@ -15,7 +15,8 @@ set(begin_of_microbit 0 0x20000000)
 set(begin_of_mps2 0 0x20000000)
 set(begin_of_virt 0x80000000 0x80400000)
 
-# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf. ROM and RAM are sizes.
+# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf. ROM and RAM are the sizes
+# of these memories in bytes, for example 256K.
 function(firmware_program name machine rom ram)
   cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
   # the sources of a machine are compiled once for each set of flags

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Compiles the freestanding layers with the compiler and flags of firmware. Every header is compiled on its own. The
-# external symbols that the objects need are compared with a list.
+# build fails if the objects need external symbols other than those that tests/freestanding.sh allows.
 set_target_properties(absenc PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
 
 add_library(freestanding OBJECT tests/freestanding.cpp)

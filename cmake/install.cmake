@@ -111,7 +111,8 @@ if(TARGET absenc-command)
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)
-  # creates the manifest now, as the user, who can then still write it after root has installed
+  # creates CMake's list of installed files now, as the user who builds: if root created it during an installation, this
+  # user could not write it afterwards
   file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")
   include(package)
 endif()

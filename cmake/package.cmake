@@ -38,7 +38,8 @@ if(TARGET absenc-serve)
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_DEPENDS "absenc ${same_version}, adduser")
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_BREAKS "absenc (<< 1.0.0)")
-  set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_REPLACES "absenc (<< 1.0.0)")  # which had the unit of systemd
+  # before 1.0.0 the package absenc contained the systemd service, which is now in absenc-serve
+  set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_REPLACES "absenc (<< 1.0.0)")
   set(scripts "${PROJECT_SOURCE_DIR}/cmake/debian/serve")
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_CONTROL_EXTRA "${scripts}/postinst;${scripts}/prerm;${scripts}/postrm")
   set(CPACK_DEBIAN_ABSENC-SERVE_PACKAGE_CONTROL_STRICT_PERMISSION ON)
@@ -58,7 +59,8 @@ absenc_package(libabsenc-dev libdevel "${PROJECT_DESCRIPTION} (development files
   "This package holds the static libraries with their headers, and the files for"
   "CMake and pkg-config.")
 if(TARGET absenc-client)
-  # absenc::client needs none of these: they are for absenc::captures, absenc::ftdi, absenc::gpio and absenc::hdf5
+  # absenc::client needs none of the suggested packages: they are for absenc::captures, absenc::ftdi, absenc::gpio and
+  # absenc::hdf5
   set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SUGGESTS
       "libdeflate-dev, libftdi1-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libminizip-dev")
 endif()

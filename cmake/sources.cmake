@@ -11,7 +11,7 @@ set(absenc_separate_folders absenc/os/linux/cuse absenc/os/linux/without_cuse ab
     absenc/os/linux/gpio)
 
 # Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
-# in the separate folders are included only if that folder is given.
+# in a folder of absenc_separate_folders are included only if exactly that folder is given.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)

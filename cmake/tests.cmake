@@ -20,8 +20,8 @@ set(absenc_long_python_tests
     serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool
     serve_browser serve_client serve_look  # these tests need a browser and npm
     mqtt_failures_abuse mqtt_packets_abuse mqtt_spool_abuse serve_history_abuse serve_http_abuse)
-# GoogleTest filters of long tests, for each executable. Of the executable kit all series of faults but the first are
-# long.
+# GoogleTest filters that select the long tests, for each executable. In the executable kit all series of faults but the
+# first are long.
 set(absenc_long_kit_tests)
 foreach(series RANGE 1 9)
   list(APPEND absenc_long_kit_tests "Seeds/*/${series}_*")
@@ -39,14 +39,17 @@ function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_options(${target} PRIVATE -O0)
-  if(ABSENC_FUZZ)  # fuzzers do not use the coverage of tests, which takes a quarter of the compile time
+  # A fuzzer needs coverage instrumentation in the code that it runs, but not in the tests, where the instrumentation
+  # takes a quarter of the compile time.
+  if(ABSENC_FUZZ)
     target_compile_options(${target} PRIVATE -fsanitize-coverage=0)
   endif()
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture ${libzip_LIBRARIES} rapidcheck GTest::gtest_main
                                           GTest::gmock)
 endfunction()
 
-# Only this test gets the path of the sources as a macro: with such a macro the compiler cache is useless.
+# Only modes_test.cpp gets the path of the sources as a macro: for a file with such a macro the compiler cache is
+# useless in another copy of the sources.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
@@ -85,7 +88,7 @@ function(absenc_test name)
   gtest_discover_tests(${name}_test ${discovery} PROPERTIES ENVIRONMENT "${environment}")
 endfunction()
 
-# Removes from a list of sources all that contain no test for every unit.
+# Keeps in a list of sources only those with a test that runs for every unit (INSTANTIATE_TEST_SUITE_P).
 function(absenc_keep_tests_for_every_unit list_of_sources)
   set(kept)
   foreach(source IN LISTS ${list_of_sources})

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `absenc --version` says beside the version: commit, architecture and what is built in.
+# Determines the commit, the architecture and the optional parts of the build, which `absenc --version` prints.
 find_package(Git QUIET)
 set(absenc_commit unknown)
-if(EXISTS "${PROJECT_SOURCE_DIR}/COMMIT")  # written into archives of the sources
+if(EXISTS "${PROJECT_SOURCE_DIR}/COMMIT")  # archives of the sources contain this file instead of .git
   file(READ "${PROJECT_SOURCE_DIR}/COMMIT" absenc_commit)
   string(STRIP "${absenc_commit}" absenc_commit)
 elseif(GIT_FOUND AND EXISTS "${PROJECT_SOURCE_DIR}/.git")

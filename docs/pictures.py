@@ -18,7 +18,7 @@ from command_support import ABSENC, Emulator, end  # noqa: E402
 from serve_support import Server, wait_until  # noqa: E402
 
 PICTURES = os.path.join(HERE, "pictures")
-MINUTE = 62  # number of seconds until a trace of the last minute is full
+MINUTE = 62  # seconds until the page's plot, which shows the last minute, is full
 COLORS = ["#1c2128", "#ff8080", "#58c98c", "#e3b04b", "#7db7f5", "#d2a8ff", "#76d9e0", "#e9edf1"]
 
 

@@ -44,7 +44,8 @@ LICENCES = {
     "pybind11-dev": "BSD-3-Clause",
     "libjs-dygraphs": "MIT",
 }
-HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev"]  # compiled into every command
+# Packages whose headers contain code that is compiled into the command absenc on every architecture.
+HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev"]
 STATIC = ["libstdc++-12-dev", "zlib1g-dev", "libminizip-dev", "libdeflate-dev", "libgpiod-dev"]
 
 
@@ -52,7 +53,7 @@ STATIC = ["libstdc++-12-dev", "zlib1g-dev", "libminizip-dev", "libdeflate-dev", 
 class Architecture:
     """A machine for which programs are built, by Debian's name."""
     name: str
-    tuple: str  # of the compiler
+    tuple: str  # prefix of the names of the compiler and its tools
     processor: str
     emulator: str
 
@@ -113,7 +114,7 @@ class Release:
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
             for name in sorted(files):
                 content, mode = files[name]
-                info = zipfile.ZipInfo(name)  # dated 1980-01-01
+                info = zipfile.ZipInfo(name)  # without a given date, ZipInfo dates each file 1980-01-01
                 info.external_attr = (0o100000 | mode) << 16
                 info.compress_type = zipfile.ZIP_DEFLATED
                 archive.writestr(info, content)
@@ -122,7 +123,8 @@ class Release:
 
     def tree(self, architecture, kind, *options):
         """Configures a build tree and returns its path."""
-        path = ROOT / f"build/tree-{architecture.name}-{kind}"  # as deep as other trees, for a compiler cache
+        # this build tree is as deep in the folders as all others, so that a compiler cache sees the same relative paths
+        path = ROOT / f"build/tree-{architecture.name}-{kind}"
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG", "-DCMAKE_INSTALL_PREFIX=/usr",
                    "-DABSENC_WERROR=ON", "-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF", "-DPython3_EXECUTABLE=/usr/bin/python3", *options]
         if not architecture.native:
@@ -157,7 +159,7 @@ class Release:
                          "-DABSENC_HDF5=OFF")
         self.build(tree, "absenc-command", "absenc-manual", "absenc-python")
         self.tarball(architecture, tree)
-        if architecture.name != "armhf":  # nobody else takes wheels for 32-bit ARM
+        if architecture.name != "armhf":  # wheels are hardly used on 32-bit ARM, so none is built
             self.wheel(architecture, tree)
 
     def strip(self, architecture, path):
@@ -237,18 +239,18 @@ class Release:
         sources = {name: content for name, content in files.items() if layers.match(name) and not tests.search(name)}
         common = {name: files[name] for name in ("LICENSE", "README.md")}
 
-        path = TREES / f"absenc-{VERSION}-platformio.tar.gz"  # pio pkg install --library FILE
+        path = TREES / f"absenc-{VERSION}-platformio.tar.gz"  # users install it by: pio pkg install --library FILE
         self.write_tar(path, {**sources, **common, "library.json": files["library.json"]})
         self.publish(path)
 
         own = {name: files[name] for name in ("CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake", "idf_component.yml")}
-        path = TREES / f"absenc-{VERSION}-esp-idf.tar.gz"  # unpack into components/
+        path = TREES / f"absenc-{VERSION}-esp-idf.tar.gz"  # users unpack it into components/ of their project
         self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
         self.publish(path)
 
         own = {name: content for name, content in files.items() if name.startswith(("zephyr/", "packages/zephyr/"))}
         own["cmake/sources.cmake"] = files["cmake/sources.cmake"]
-        path = TREES / f"absenc-{VERSION}-zephyr.tar.gz"  # unpack as a module: ZEPHYR_EXTRA_MODULES
+        path = TREES / f"absenc-{VERSION}-zephyr.tar.gz"  # users unpack it and name its folder in ZEPHYR_EXTRA_MODULES
         self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
         self.publish(path)
 
@@ -257,7 +259,7 @@ class Release:
             export.export(scratch)
             arduino = {str(file.relative_to(scratch)): (file.read_bytes(), 0o644)
                        for file in Path(scratch).rglob("*") if file.is_file()}
-        path = TREES / f"absenc-{VERSION}-arduino.zip"  # arduino-cli lib install --zip-path FILE
+        path = TREES / f"absenc-{VERSION}-arduino.zip"  # users install it by: arduino-cli lib install --zip-path FILE
         self.write_zip(path, arduino)
         self.publish(path)
 

@@ -7,16 +7,19 @@ foreach(package IN LISTS CPACK_COMPONENTS_ALL)
   if(man_pages)
     execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
   endif()
-  file(GLOB_RECURSE modules "${root}/lib/python3/*.so")  # CPack strips only what is a target
+  # CPack strips only files that are installed as targets of CMake, so Python modules are stripped here
+  file(GLOB_RECURSE modules "${root}/lib/python3/*.so")
   foreach(module IN LISTS modules)
     execute_process(COMMAND "${CPACK_ABSENC_STRIP}" --strip-unneeded --remove-section=.comment "${module}"
                     COMMAND_ERROR_IS_FATAL ANY)
   endforeach()
   set(documents "${root}/share/doc/${package}")
-  file(REMOVE "${documents}/LICENSE")  # the text of the licence is in /usr/share/common-licenses
+  # the package needs no text of its licence, because Debian has it in /usr/share/common-licenses
+  file(REMOVE "${documents}/LICENSE")
   file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
        FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
-  string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)  # SOURCE_DATE_EPOCH, if it is set
+  # the date is the environment variable SOURCE_DATE_EPOCH if it is set, otherwise the present time
+  string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
   file(WRITE "${documents}/changelog"
        "absenc (${CPACK_PACKAGE_VERSION}) stable; urgency=medium\n\n"
        "  * CHANGELOG.md of the project says what changed.\n\n"

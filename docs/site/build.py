@@ -17,8 +17,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 AWESOME = Path("/usr/share/doxygen-awesome-css/doxygen-awesome.css")
 PAGES = ["README.md", "CONTRIBUTING.md", "docs/*.md", "absenc/protocol/*/README.md", "tests/abuse/README.md"]
-# Lists of pages below the README, which is the index, by their caption. Sphinx reports a page that no list names as an
-# error.
+# Lists of the pages in the index, each with the caption that stands above it; the README is the index itself. Sphinx
+# reports a page that no list names as an error.
 CONTENTS = {
     "Use": ["docs/read", "docs/set-up", "docs/record", "docs/serve", "docs/mqtt", "docs/tap", "docs/decode", "docs/doctor",
             "docs/test-a-drive", "docs/clock-cable", "man/absenc.1"],

@@ -11,7 +11,8 @@ project = "absenc"
 version = release = os.environ["ABSENC_VERSION"]
 copyright = "absenc developers, Apache-2.0"  # noqa: A001: the name is Sphinx's
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
-nitpicky = False  # false, because types of the standard library and of NumPy have no page here
+# Sphinx does not report references without a target, because types of Python's library and of NumPy have no page here
+nitpicky = False
 myst_heading_anchors = 4
 autodoc_typehints = "signature"
 autodoc_member_order = "groupwise"
