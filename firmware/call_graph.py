@@ -75,7 +75,7 @@ class Function:
     def jump_table(self, address, index_of):
         """Returns the targets in the table of addresses behind the jump at `address`."""
         targets = []
-        at = (address + 7) & ~3  # the jump has 4 bytes, and words are aligned
+        at = (address + 7) & ~3  # the table begins behind the jump, which has 4 bytes, at a multiple of 4
         while (target := self.words.get(at, 0) & ~1) in index_of:
             targets.append(target)
             at += 4

@@ -101,7 +101,8 @@ class CycleCheck {
     extrapolation_.add(reading);
     if (!extrapolation_.valid()) return;
     if (extrapolation_.bits() != reading.singleturn_bits + reading.multiturn_bits) return;
-    // An extrapolated position has the errors of two readings, each of a count and of the jitter of its time.
+    // An extrapolated position has the errors of two readings: for each a count, and the motion within the jitter of
+    // its latch time.
     if (!is_near(extrapolation_.at(next), reading, next, 6, 3)) ++far_;
   }
   [[nodiscard]] bool is_right() const { return wrong_ == 0 && far_ == 0; }
@@ -128,10 +129,12 @@ class CycleCheck {
     if (!extrapolation_.valid() || gap > longest_gap) return true;
     const unsigned bits = extrapolation_.bits();
     if (bits != reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0)) return true;
-    // Numbers of 32 bits, because a processor without division is slow with 64.
+    // The times have 32 bits, because a processor without a division instruction divides numbers of 64 bits slowly.
     const auto gap_ns = static_cast<std::uint32_t>(gap.count());
     const auto span_ns = static_cast<std::uint32_t>(span_.count());
-    constexpr std::uint32_t by_acceleration = 8;  // counts of 2^-19 revolution: 100 revolutions/s^2 for `longest_gap`
+    // counts of 2^-19 revolution by which an acceleration of 100 revolutions/s^2 moves the shaft in `longest_gap`,
+    // rounded up
+    constexpr std::uint32_t by_acceleration = 8;
     const std::uint32_t error = 1 + step_ * (static_cast<std::uint32_t>(jitter_.count()) / 100) / (span_ns / 100);
     const std::uint32_t allowed = by_acceleration + 2 * error * (1 + gap_ns / span_ns);
     return distance(extrapolation_.at(reading.latched), counts_of(reading), bits) <= allowed;
@@ -295,7 +298,8 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     const std::int64_t address = i % plan.addresses;
     const std::int64_t page = plan.page + i / plan.addresses;
     const std::int64_t value = (i * 37 + 11) & 0xFF;
-    const std::array<std::int64_t, 4> write{address, value, page, 1};  // BiSS writes most banks only if forced: 1
+    // the last argument, 1, forces the write, because BiSS writes most banks only then
+    const std::array<std::int64_t, 4> write{address, value, page, 1};
     const std::array<std::int64_t, 3> read{address, page, 1};
     const std::size_t write_count = find_command(bench.unit(), "memory-write")->arguments.size();
     // If a damaged reply ends a command, the command is run again: writing the same byte twice does no harm.
@@ -307,7 +311,8 @@ bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::u
     }
   }
   const machine::InterruptLock lock;
-  // The first cycle begins after one period, and each cycle has its result, which may come in the next one.
+  // Up to two results may be missing: the first cycle begins only after one period, and the result of the last cycle
+  // may come in the next one.
   const std::int64_t left_out = machine::now() / plan.period - bench.check().all();
   bench.check().print_counts();
   print_count("bytes", written);

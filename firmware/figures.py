@@ -58,7 +58,7 @@ def run(plugin, program, cpu, *names):
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, text=True, check=False)
     if result.returncode != 0:
         sys.exit(f"{program} read no position: {result.stdout}{result.stderr}")
-    # the number that the emulated program prints is found in standard error, to which the program writes
+    # the emulated program prints its number on standard error, the plugin prints its counts on standard output
     return result.stdout, int(re.search(r"\d+", result.stderr)[0])
 
 

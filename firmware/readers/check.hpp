@@ -44,7 +44,7 @@ struct Motion {
   Time open;            // greatest uncertainty of the time at which a reading was latched
 };
 
-/// Gives readings of many motions to a part, then ends the emulator.
+/// Gives readings of many motions to a part of absenc/host, then ends the emulator.
 template <class Part>
 [[noreturn]] void run() {
   using std::chrono::microseconds, std::chrono::milliseconds, std::chrono::seconds;
