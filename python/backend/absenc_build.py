@@ -101,7 +101,7 @@ def write_wheel(path, package, tag, licences):
     contents[f"{info}/RECORD"] = (record + f"{info}/RECORD,,\n").encode()
     with zipfile.ZipFile(path, "w") as wheel:
         for name, data in contents.items():
-            entry = zipfile.ZipInfo(name)  # dated 1980-01-01, so that the same files give the same bits
+            entry = zipfile.ZipInfo(name)  # ZipInfo dates it 1980-01-01, so that the same files give the same bits
             entry.external_attr = 0o100644 << 16
             entry.compress_type = zipfile.ZIP_DEFLATED
             wheel.writestr(entry, data)

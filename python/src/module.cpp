@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The extension module absenc._absenc, which absenc/*.py is based on.
-#include "absenc/client/configuration.hpp"  // names of absenc.toml
+#include "absenc/client/configuration.hpp"  // names in absenc.toml work only in programs that include this header
 #include "python/src/bind.hpp"
 #ifdef ABSENC_FTDI
-#include "absenc/os/ftdi.hpp"  // ports may use FTDI chips
+#include "absenc/os/ftdi.hpp"  // FTDI chips can be opened as ports only in programs that include this header
 #endif
 #ifdef ABSENC_GPIO
-#include "absenc/os/gpio.hpp"  // ports may use GPIO lines
+#include "absenc/os/gpio.hpp"  // ports can send pulses on GPIO lines only in programs that include this header
 #endif
 #ifdef ABSENC_HDF5
-#include "absenc/client/hdf5.hpp"  // recordings may be HDF5
+#include "absenc/client/hdf5.hpp"  // recordings can be written in HDF5 only in programs that include this header
 #endif
 
 PYBIND11_MODULE(_absenc, module) {

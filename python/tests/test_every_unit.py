@@ -75,7 +75,7 @@ def test_encodes_and_decodes_requests(unit):
         if unit.link == "can":
             other = "7" + request[1:]
         elif unit.link == "clocked_bidirectional":
-            other = "1111 1111"  # no mode command begins with 1
+            other = "1111 1111"  # no mode command of EnDat begins with 1
         else:
             other = b"\xff" + request[1:] + b"\xff"
         with pytest.raises(absenc.EncoderError):

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "absenc/client/configuration.hpp"  // this include lets the command read absenc.toml
+#include "absenc/client/configuration.hpp"  // the command reads absenc.toml
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/os/error.hpp"
 #include "tools/absenc/command_line.hpp"
@@ -24,10 +24,10 @@
 #include "tools/absenc/verbs/run.hpp"
 #include "tools/absenc/version.hpp"
 #ifdef ABSENC_FTDI
-#include "absenc/os/ftdi.hpp"  // this include lets the command open FTDI chips as ports
+#include "absenc/os/ftdi.hpp"  // FTDI chips can be opened as ports only in programs that include this header
 #endif
 #ifdef ABSENC_GPIO
-#include "absenc/os/gpio.hpp"  // this include lets the command send pulses on GPIO lines
+#include "absenc/os/gpio.hpp"  // ports can send pulses on GPIO lines only in programs that include this header
 #endif
 
 namespace absenc::tool {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program that the verb `absenc serve` starts with the same command line. It is a separate program, because only it
-// needs the libraries of the server.
+// The program that the verb `absenc serve` starts with the same command line; apart, because only it needs the
+// libraries of the server.
 #include <fmt/format.h>
 
 #include <array>
 #include <optional>
 #include <span>
 
-#include "absenc/client/configuration.hpp"  // this include lets the server read absenc.toml
+#include "absenc/client/configuration.hpp"  // the server reads absenc.toml
 #include "absenc/os/hangup.hpp"
 #include "absenc/os/realtime.hpp"
 #include "absenc/os/signals.hpp"
@@ -24,10 +24,10 @@
 #include "tools/absenc/verbs/serve.hpp"
 #include "tools/absenc/version.hpp"
 #ifdef ABSENC_FTDI
-#include "absenc/os/ftdi.hpp"  // this include lets the server open FTDI chips as ports
+#include "absenc/os/ftdi.hpp"  // FTDI chips can be opened as ports only in programs that include this header
 #endif
 #ifdef ABSENC_GPIO
-#include "absenc/os/gpio.hpp"  // this include lets the server send pulses on GPIO lines
+#include "absenc/os/gpio.hpp"  // ports can send pulses on GPIO lines only in programs that include this header
 #endif
 
 namespace absenc::tool {
