@@ -127,7 +127,8 @@ class DoctorFaults(Case):
             also = "good sometimes_damaged" if proxy.changed <= 1 else "sometimes_damaged" if proxy.changed < 10 else ""
             if unit in WEAK_CHECK and wanted in BYTE_CHANGES:
                 also += " sometimes_damaged damaged_bits damaged_bursts"
-            # an encoder that sends unsolicited frames is never silent, even without this fault
+            # An encoder that gets no requests and sends unsolicited frames is never silent, even without the fault
+            # "chatter", so doctor may report damaged replies instead.
             if what == "chatter" and proxy.requests == 0:
                 also += " always_damaged sometimes_damaged"
             also += f" {ALSO.get((unit, what), '')}"

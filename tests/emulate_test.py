@@ -274,7 +274,7 @@ class DataIds(EmulateCase):
         """The encoder answers most invalid requests like a request for ID 3."""
         client = self.client()
         everything = client.exchange(3)
-        self.assertEqual(client.exchange(0x4, length=11), everything)  # an unknown data ID
+        self.assertEqual(client.exchange(0x4, length=11), everything)  # a request with an unknown data ID
         client.send([0x9A])  # a request with a wrong parity bit
         self.assertEqual(client.receive(11)[:2], bytes([0x1A, 0x40]))
         client.send([0xEA, 5, 0])  # a request with a wrong CRC

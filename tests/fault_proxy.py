@@ -38,9 +38,9 @@ class FaultProxy(FakeLine):
         self.fault = fault
         self.encoder = os.open(encoder, os.O_RDWR | os.O_NOCTTY) if encoder else None
         os.set_blocking(self.master, False)
-        self.requests = 0  # number of pieces of requests received from the host
+        self.requests = 0  # number of blocks of bytes read from the host; a request may arrive in several blocks
         self.unread = 0  # number of bytes for the host that were dropped, because the pseudo-terminal was full
-        # number of pieces of requests and replies that the fault has changed, dropped, delayed or added
+        # number of blocks of bytes, from host or encoder, that the fault has changed, dropped, delayed or added
         self.changed = 0
 
     def __exit__(self, *_):

@@ -121,8 +121,8 @@ class Cycles(unittest.TestCase):
         # A damaged reply costs one cycle, or two if the line must be silent before the next request.
         self.assertLessEqual(counted["missing"], 2 * counted["faults"], output)
         self.assertGreater(counted["bytes"], 0, output)
-        # Few positions are marked as invalid, or implausible because no other confirms them: the first one, and those of
-        # damage that the checks have missed.
+        # Few positions are counted as invalid or implausible: the first one, because no earlier one confirms it, and
+        # those in damaged replies that the check of the frame has accepted.
         self.assertLessEqual(counted["implausible"] + counted["invalid"], 1 + counted["faults"] // 100, output)
         return counted, output
 
@@ -130,8 +130,8 @@ class Cycles(unittest.TestCase):
         for cpu in ("microbit", *CORES):
             with self.subTest(cpu):
                 counted, output = self.check("tformat", cpu)
-                # Each request of a command takes one cycle from the positions, and never two consecutive cycles
-                # except for ten resets.
+                # Each request of a command takes a cycle in which no position is requested ("repeated"). Between two of
+                # these cycles a position is requested, except between the ten requests of a reset.
                 self.assertGreater(counted["repeated"], 0, output)
                 self.assertEqual(counted["invalid"], 0, output)  # the exclusive OR notices each single wrong bit
                 self.assertLessEqual(counted["longest_stale"], 16, output)
@@ -228,7 +228,8 @@ class FloatingPoint(unittest.TestCase):
                 self.assertEqual(self.soft_functions(reader), [])
 
     def test_all_units_together_link_some(self):
-        # Checks the search itself: it finds soft-float functions in a program of units that have real-number fields.
+        # Checks the search for soft-float functions itself: it must find some in a program of units that have
+        # real-number fields.
         found = self.soft_functions("vectors-m0plus")
         self.assertIn("__aeabi_dmul", found)
         self.assertIn("__floatdidf", found)

@@ -13,8 +13,9 @@ allowed=(
   memcpy memmove memset memcmp strlen
   '__aeabi_[a-z0-9_]+'
   '__gnu_thumb1_case_[a-z]+'
-  '__[a-z]+[sd]i[23]'  # functions of libgcc, such as __popcountsi2 and __clzdi2
-  __cxa_pure_virtual   # stands for pure virtual functions in the virtual table of every abstract class; never called
+  '__[a-z]+[sd]i[23]'  # allows functions of libgcc, such as __popcountsi2 and __clzdi2
+  # the compiler enters __cxa_pure_virtual for each pure virtual function in a virtual table; it is never called
+  __cxa_pure_virtual
 )
 pattern=$(IFS='|'; echo "^(${allowed[*]})\$")
 

@@ -22,14 +22,16 @@ SERVE_DOCUMENTS = {f"share/doc/absenc-serve/{name}"
 # Man pages made from the pages of docs/, one for each page.
 GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
 
-# The libraries in the order in which each needs those before it; absenc::client is all that reads an encoder.
+# The installed libraries, each behind those that it needs. A program that reads an encoder needs absenc-client and the
+# three libraries before it.
 PARTS = ("absenc", "absenc-os", "absenc-search", "absenc-client", "absenc-configuration", "absenc-capture",
          "absenc-captures", "absenc-recording", "absenc-hdf5", "absenc-ftdi", "absenc-gpio")
 PKG_CONFIG = ("absenc", "absenc-client", "absenc-configuration", "absenc-captures", "absenc-recording", "absenc-hdf5",
               "absenc-ftdi", "absenc-gpio")
 # Shared libraries of a program that links only absenc::client: those of C++ and C.
 STANDARD = {"linux-vdso", "libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86-64", "ld-linux-aarch64"}
-# Names that the symbols of such a program must not contain, because they are from other libraries.
+# Names that the symbols of a program that links only absenc::client must not contain, because they are from other
+# libraries.
 FOREIGN = re.compile(r"nlohmann|toml::|\bH5[A-Z]|\bhwy::|\b(zip|unz)[A-Z]|libdeflate|\bftdi_usb_open|\bgpiod_line_find")
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
@@ -135,7 +137,8 @@ an alarm or a state that the encoder reports says that the position does not hol
 a change that is not possible: not_sent
 """
 
-# A program that uses everything that extends absenc::client.
+# A program that uses all optional libraries which extend absenc::client: captures, recordings, HDF5, absenc.toml, FTDI
+# chips and GPIO lines.
 EXTENDED = r"""
 #include <cstdio>
 #include <exception>
@@ -164,7 +167,8 @@ int main(int, char** arguments) try {
   return 1;
 }
 """
-# A program that opens each kind of place; none of them is there.
+# A program that opens the encoder addresses in its arguments and prints the error of each. The test gives it an address
+# for each kind of port, all of which fail.
 EACH_PLACE = r"""
 #include <cstdio>
 #include <exception>
@@ -580,7 +584,8 @@ class Packages(unittest.TestCase):
         files = [os.path.normpath(run("g++", f"-print-file-name=lib{name}.so").strip()) for name in linked]
         owners = {run("dpkg", "-S", file).split(":")[0] for file in files}
         suggested = set(self.field("libabsenc-dev", "Suggests").split(", "))
-        self.assertEqual(suggested, owners - {"zlib1g-dev"})  # which libminizip-dev depends on
+        # zlib1g-dev is not suggested, because libminizip-dev depends on it
+        self.assertEqual(suggested, owners - {"zlib1g-dev"})
         self.assertEqual(self.field("libabsenc-dev", "Depends"), "")
 
     def test_each_installed_file_is_in_one_package(self):

@@ -55,7 +55,8 @@ class Keys(Case):
         for suffix in ("csv", "jsonl", "h5"):
             self.assertEqual(list(library.load(self.recorded(encoder, suffix)).keys()), columns, suffix)
 
-        # The Python module has the flags of a channel in lists, so columns of flags have no member of their own.
+        # A reading in Python has all its flags in the members `status` and `alarms`, so a column with the flags of one
+        # channel has no member of its own.
         with library.open(encoder) as opened:
             sample = next(iter(opened.samples(rate=200)))
         for name in set(columns) - ONLY_IN_ROWS | json_keys - ONLY_IN_JSON:

@@ -67,7 +67,8 @@ class Mutant(NamedTuple):
 
 def with_switches(text, numbered):
     """Returns `text` with the switches inserted. `numbered`: pairs of number and mutant."""
-    # If the code of one mutant is part of the code of another, its switch is inserted inside the switch of the other.
+    # A switch is inserted code that selects a mutant at run time. If the code of one mutant is part of the code of
+    # another, its switch is inserted inside the switch of the other.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch

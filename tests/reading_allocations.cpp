@@ -64,7 +64,7 @@ namespace absenc::client {
 namespace {
 
 const std::string slow = "?max_rpm=100";
-const std::string patient = slow + "&latency=20000";  // in ms: a busy computer answers late
+const std::string patient = slow + "&latency=20000";  // a latency of 20 s: a busy computer answers late
 // The buffers of a simulated line grow with its second transfer; a port allocates nothing after the first reading.
 int readings_before(const std::string& address) { return address.starts_with("sim:") ? 2 : 1; }
 constexpr int last = 1000;
@@ -83,7 +83,7 @@ void expect_no_allocation_of_samples(const std::string& address) {
   Encoder encoder = open(address);
   std::uint64_t before = 0;
   int number = 0;
-  int gaps = 0;  // a busy computer may be late
+  int gaps = 0;  // number of samples without a reading, which a busy computer may cause
   for (const Sample& sample : encoder.samples({.rate_hz = 2000, .count = last})) {
     if (sample.kind != Sample::Kind::reading) ++gaps;
     if (++number == readings_before(address)) before = allocations;

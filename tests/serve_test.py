@@ -381,7 +381,8 @@ class PortInUse(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # A file of a server that names another process than the holder of the port must be ignored.
+            # The file by which a server announces its page must be ignored if it names another process than the one
+            # that uses the port.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr

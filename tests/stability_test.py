@@ -21,7 +21,8 @@ SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().paren
 GOLDEN = SOURCE / "tests/golden"
 CAPTURE = str(SOURCE / "examples/tformat.txt")
 
-# A command line for each verb that prints JSON and ends by itself; ports and changes depend on the computer.
+# A command line for each verb that prints JSON and ends by itself. The verbs `ports` and `changes` are left out,
+# because their output depends on the computer.
 JSON_VERBS = {
     "list": ["list", "tformat"],
     "read": ["read", "sim:tformat", "--count", "2"],
@@ -88,7 +89,7 @@ def declarations(text):
             elif is_scope and not words.startswith("enum"):
                 lines.append(words)
                 statement = ""
-            else:  # an initializer or an enumeration: a part of the declaration
+            else:  # the braces are part of a declaration: those of an initializer or an enumeration
                 depth, start = 1, i
                 while depth:
                     i += 1
@@ -170,8 +171,8 @@ class Stable(unittest.TestCase):
 
     def test_json_of_each_verb(self):
         takes_json = {verb for verb in verbs() if "  --json" in absenc(*verb.split(), "--help").stdout}
-        # monitor, tap and conform-host wait for a line; campaign and bench run long; ports and changes depend on the
-        # computer; the others need files, which their own tests make
+        # The verbs monitor, tap and conform-host wait for a line; campaign and bench run long; the output of ports and
+        # changes depends on the computer; the other verbs need files, which their own tests make.
         elsewhere = {"monitor", "tap", "conform-host", "campaign", "bench", "ports", "changes", "probe", "crc find",
                      "memory load", "memory verify", "config set"}
         self.assertEqual({name.split(",")[0] for name in JSON_VERBS}, takes_json - elsewhere)

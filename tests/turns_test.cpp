@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the difference between consecutive readings: if a reading continues the previous one, it must have the
-// shaft's motion.
+// Tests the unwrapper: if it continues from the previous reading, the difference between the two positions must be the
+// motion of the shaft between them.
 #include <gtest/gtest.h>
 
 #include <algorithm>

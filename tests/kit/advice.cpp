@@ -16,7 +16,7 @@ namespace {
 /// A command line that stands in backquotes in the text of an advice.
 struct NamedCommand {
   std::string text;  // the command line, for example "absenc run ... reset"
-  // the unit's command that the command line runs; null if the line suits every unit or is unknown
+  // the unit's command that `text` runs; null if `text` suits every unit, or runs no known command
   const Command* command = nullptr;
   bool unknown = false;
 };

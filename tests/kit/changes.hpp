@@ -87,7 +87,8 @@ ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command&
   });
 }
 
-/// Returns the promise that a command broke although it succeeded on an undamaged line; "" if it broke none.
+/// Checks the effect of a command that reported success on an undamaged line. Returns in words how the encoder differs
+/// from the effect that the command promises; "" if it does not differ.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const ReportedFields& written) {

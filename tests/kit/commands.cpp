@@ -16,7 +16,8 @@ bool is_plain(const Command& command) {
          command.verb == Verb::temperature || command.verb == Verb::config_get;
 }
 
-// Returns whether `error` means that an encoder may refuse the command, which `read` never allows.
+// Returns whether `error` means that the encoder does not support the command or its arguments. Always returns false
+// for `read`, which every encoder must support.
 bool is_refused(const Command& command, Error error) {
   return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
 }

@@ -15,15 +15,16 @@ namespace {
 struct Ride {
   bool is_over = false;     // whether the command has ended or was refused
   bool is_refused = false;  // whether the command was refused, because its request does not fit between two positions
-  Time needs{};             // time in nanoseconds that this request would need between two positions
+  // time in nanoseconds that the request of a refused command would need between two positions
+  Time needs{};
   Error error = Error::none;
   ReportedFields seen{};
   unsigned fresh = 0;
   unsigned repeated = 0;
   unsigned unanswered = 0;  // number of cycles in which the encoder did not answer
-  unsigned others = 0;      // number of answered cycles whose position is neither fresh nor repeated
+  unsigned others = 0;      // number of answered cycles that neither gave a new position nor repeated the previous one
   std::string other{};      // kind or error of the first cycle counted in `others`
-  unsigned wrong = 0;       // number of fresh cycles with another position than the shaft's
+  unsigned wrong = 0;       // number of cycles whose new position was not that of the shaft
   std::uint32_t violations = 0;
   std::uint32_t changes = 0;  // number of changes of the encoder's memory
 };

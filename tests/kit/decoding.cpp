@@ -120,8 +120,8 @@ class Decoding {
 
   [[nodiscard]] std::size_t open_bits(OpenBytes open) const { return open.count * (carries_bits(unit_.link) ? 1 : 8); }
 
-  // Returns the frame with each value of its open bytes for which `is_good` is true; nothing if there are too many
-  // values to try.
+  // Returns copies of the frame with its open bytes (bytes that the test vector leaves out) filled with each value for
+  // which `is_good` is true. Returns nothing if there are too many values to try.
   template <class IsGood>
   [[nodiscard]] std::vector<Wire> filled(Bytes frame, OpenBytes open, const IsGood& is_good) const {
     const bool is_bits = carries_bits(unit_.link);

@@ -36,9 +36,10 @@ struct Tally {
   std::uint64_t exchanges = 0;
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
-  std::uint64_t damaged = 0;                // number of faults of the line that changed bytes
-  std::uint64_t wrong = 0;                  // number of wrong results of commands whose replies have a check
-  std::uint64_t rule_violations = 0;        // violations of rules by the host, only with a model's options
+  std::uint64_t damaged = 0;  // number of faults of the line that changed bytes
+  std::uint64_t wrong = 0;    // number of wrong results of commands whose replies have a check
+  // number of violations by the host of rules in the encoder's document; counted only with a model's options
+  std::uint64_t rule_violations = 0;
   std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes (CAN: frames) in requests
   // number of conversations with commands that change the encoder, without those that were refused
   std::uint64_t changes = 0;
@@ -223,7 +224,8 @@ class Campaign {
     if (damage.example.empty()) damage.example = wrong.text;
   }
 
-  // Returns whether the fields `seen` are reported on an undamaged line, too; if so, discards all recorded results.
+  // Runs the command again, on an undamaged line, and returns whether it reports all fields of `seen` with the same
+  // values. If so, the encoder has changed, and all recorded results are discarded.
   bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
     const ConversationResult now = world_.run(*query.command, query.arguments);
@@ -339,7 +341,7 @@ class Campaign {
                                           query.arguments);
   }
 
-  // Counts the rules that the host broke with a model's options.
+  // Counts how often the host broke rules in the encoder's document, if the options are a model's.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
@@ -382,7 +384,7 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
       findings.add("too few exchanges per round");
       break;
     }
-    // In even rounds only configurations of models are run; these are the first ones.
+    // Even rounds use only the configurations of models, which stand first in `setups`.
     const Configuration& configuration = setups[round / 2 % (round % 2 == 0 ? models : setups.size())];
     Campaign<Item> campaign(unit, configuration, test, 1000 * test.seed + round, tally, findings);
     if (!campaign.is_possible()) continue;

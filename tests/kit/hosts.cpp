@@ -240,7 +240,7 @@ struct VectorReplay {
     return taken;
   }
 
-  // Returns whether no value is reported that the decoded reply has with another value.
+  // Returns whether every field that is in both `reported` and `decoded` has the same value in both.
   [[nodiscard]] static bool shares(const std::map<std::string, Value>& reported,
                                    const std::map<std::string, Value>& decoded) {
     return std::ranges::all_of(reported, [&](const auto& one) {

@@ -19,7 +19,8 @@ constexpr double two_to_32 = 4294967296.0;
 
 double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// A shaft that accelerates, brakes, and does the same in the other direction. It stores when it was looked at.
+/// A shaft that accelerates, brakes, and does the same in the other direction. It stores the times at which it was
+/// looked at, because the encoder needed its position.
 class TurningShaft final : public Shaft {
  public:
   /// Starts the motion at `begin`: four parts of `quarter`, with an acceleration in revolutions/s^2.
@@ -56,7 +57,7 @@ class TurningShaft final : public Shaft {
     const auto found = std::find_if(looked_at_.rbegin(), looked_at_.rend(), shows);
     return found == looked_at_.rend() ? std::nullopt : std::optional(*found);
   }
-  /// Forgets the instants before `time`.
+  /// Forgets at which times before `time` the shaft was looked at.
   void forget_before(Time time) {
     std::erase_if(looked_at_, [&](Time one) { return one < time; });
   }
@@ -314,7 +315,8 @@ class Drive {
     }
     shaft.forget_before(reading.latched);
     extrapolation_.add(reading);
-    // Error of the latch time that the reading states, and the time between the last two readings.
+    // `late`: error of the latch time that the reading states. `span`: time between the latch times of the last two
+    // readings. Both are in seconds.
     const double late = std::abs(seconds_of(*instant - reading.latched));
     const double span = seconds_of(reading.latched - latched_);
     latched_ = reading.latched;
@@ -322,7 +324,8 @@ class Drive {
     if (readings_++ == 0 || !extrapolation_.valid()) return;
     const double ahead = seconds_of(next - reading.latched);
     const double count = 1 / std::ldexp(1.0, static_cast<int>(reading.singleturn_bits));
-    // The bound that extrapolation.hpp states; readings are wrong by a count and by the motion until their instant.
+    // The limit of the error is that in absenc/host/extrapolation.hpp. The noise of a reading is one count, and the
+    // motion of the shaft within the error of the latch time.
     const double noise = count + shaft.top_speed() * latest;
     const double allowed = shaft.acceleration() * (ahead + latest) * (ahead + span + latest) / 2 +
                            noise * (1 + 2 * ahead / span) + 2 * count;
@@ -374,7 +377,8 @@ class Drive {
   Time latched_{};
   double late_ = 0;
   bool can_be_faulty_ = true;
-  unsigned lost_cycles_ = 0;  // most cycles that a missing reply takes
+  // greatest number of cycles without a valid position that one damaged, late or missing reply may cause
+  unsigned lost_cycles_ = 0;
   unsigned readings_ = 0;
   std::array<unsigned, 4> counts_{};
   unsigned wrong_ = 0;

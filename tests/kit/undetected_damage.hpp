@@ -44,12 +44,12 @@ struct UndetectedDamage {
 
 /// Counts the damaged replies to one command, and the wrong results that a host made of them.
 struct DamagedReplies {
-  std::optional<UndetectedDamage> undetected{};  ///< what the frame check lets pass; empty if not measured yet
-  std::uint64_t count = 0;                       ///< number of damaged replies
-  std::uint64_t wrong_positions = 0;             ///< number of wrong results with a wrong position
-  std::uint64_t wrong_values = 0;
-  std::string example{};  ///< The first wrong result, in words.  ///< number of wrong results with a right position and
-                          ///< another wrong value
+  /// measured numbers of damaged replies that the frame check accepts; empty if not measured yet
+  std::optional<UndetectedDamage> undetected{};
+  std::uint64_t count = 0;            ///< number of damaged replies
+  std::uint64_t wrong_positions = 0;  ///< number of wrong results with a wrong position
+  std::uint64_t wrong_values = 0;     ///< number of wrong results with a right position and another wrong value
+  std::string example{};              ///< the first wrong result, in words
 
   /// Adds a finding if there are more wrong results than the frame check lets pass, and a note if there is any.
   /// `command` names the command.

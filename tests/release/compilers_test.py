@@ -66,7 +66,9 @@ class Compilers(unittest.TestCase):
 
     def test_add_subdirectory(self):
         def build(compiler):
-            if compiler == "g++-11":  # cannot allocate the coroutines of the units; it compiles programs that use them
+            # g++ 11 cannot allocate the coroutines of the units, so it can compile programs that use the library, but
+            # not the library itself
+            if compiler == "g++-11":
                 with self.assertRaisesRegex(AssertionError, r"absenc\s+needs\s+a\s+compiler\s+for\s+C\+\+20"):
                     self.project(compiler, f"add_subdirectory({SOURCE} absenc)\n")
                 return

@@ -12,7 +12,8 @@ SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().paren
 VERSION = (SOURCE / "VERSION").read_text().strip()
 RELEASE = Path(os.environ.get("ABSENC_RELEASE", SOURCE / f"build/release-{VERSION}"))
 ROOTS = SOURCE / "build/release-roots"
-# Runs a program in a root: no network but its own loopback, and no process of it outlives the test.
+# Command that runs a program with another root folder (chroot): the program has no network but its own loopback, and
+# none of its processes outlives the test.
 ISOLATED = ["unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "sh", "-ec",
             'ip link set lo up 2>/dev/null || true; mount --bind /dev "$1/dev"; mount -t proc proc "$1/proc"; '
             'mount -t devpts -o newinstance,ptmxmode=0666 devpts "$1/dev/pts" 2>/dev/null || true; '
@@ -42,7 +43,7 @@ def base(name, suite, packages):
 class RootCase(unittest.TestCase):
     """A test in a root that is unpacked for each class."""
 
-    archive = None  # a function that returns the archive
+    archive = None  # function that returns the path of the archive that is unpacked as root folder
 
     @classmethod
     def setUpClass(cls):
@@ -78,7 +79,7 @@ class RootCase(unittest.TestCase):
         self.assertRegex(self.run_inside(absenc, "--version"), rf"^absenc {re.escape(VERSION)}\n")
         self.assertIn("tformat", self.run_inside(absenc, "list"))
         self.assertIn("turns", self.run_inside(absenc, "read", "sim:tformat"))
-        # one of its replies is damaged on purpose
+        # one reply in the capture tformat.txt is damaged on purpose
         self.assertIn("bad_checksum", self.run_inside(absenc, "decode", "tformat", "/work/tformat.txt", "--csv", status=1))
         self.assertIn("tformat", self.run_inside(absenc, "identify", "/work/tformat.txt"))
         self.assertIn("good", self.run_inside(absenc, "doctor", "sim:tformat", "--readings", "100"))

@@ -215,7 +215,8 @@ def build(absenc, patterns, folder):
         image.put_with_libraries(os.path.join(os.path.dirname(absenc), "../vm", name), f"/bin/{name}")
     for name in PROGRAMS:
         image.put_with_libraries(program(name), f"/bin/{name}")
-    for path in glob.glob(f"{PACKAGES}/*ftdi1*"):  # a module of Debian's Python, of which tests import the C part
+    # Debian's Python module ftdi1, which ftdi_test.py imports: a Python file and a shared library
+    for path in glob.glob(f"{PACKAGES}/*ftdi1*"):
         image.put_with_libraries(path)
     scripts = glob.glob(os.path.join(TESTS, "vm/*_test.py")) + [os.path.join(TESTS, "vm/guest.py")]
     for path in python_files(scripts):
