@@ -135,8 +135,8 @@ void FtdiPort::exchange(const ByteStep& step, TransferResult& received) {
 
 // A pause on the clock line is made by time, between two USB transfers: an MPSSE has clocks without data (0x8E and
 // 0x8F), but they move the clock pin, and it has no command that only waits. The encoder measures its timeout from the
-// falling edge, which comes late if this thread does. So the chip replies when the clock is low, and the clock stays low
-// for as long as the host wanted from then on.
+// falling edge, which comes late if this thread does. So the chip replies when the clock is low, and the clock stays
+// low for as long as the host wanted from then on.
 void FtdiPort::hold_low(Time until) {
   const Time wanted = until - end_;
   commands_.set_pins(rest() ^ MpssePin::clock);

@@ -72,7 +72,7 @@ class FtdiPort final : public TransferPort {
   std::optional<std::uint16_t> sent_divisor_{};  // the divisor that the chip has; nothing: not known
   MpsseCommands commands_;
   std::vector<std::uint8_t> replies_;
-  Time end_ = os::now();  // time at which the last transfer was known to have ended
+  Time end_ = os::now();    // time at which the last transfer was known to have ended
   bool rests_low_ = false;  // whether the clock rests low, because the exchange goes on
 };
 

@@ -66,9 +66,7 @@ void EncoderWires::pass(Time now) {
   }
 }
 
-void EncoderWires::falls(Time at) {
-  fell_at_ = last_edge_ = at;
-}
+void EncoderWires::falls(Time at) { fell_at_ = last_edge_ = at; }
 
 void EncoderWires::rises(Time at) {
   const Time low = at - fell_at_;

@@ -38,8 +38,8 @@ class EncoderWires final : public Wires {
 
   /// Starts to keep all changes, for `write_vcd`.
   void record() { records_ = true; }
-  /// Writes the clock at the chip's pin, the data of host and encoder on their pair, and the direction, as a value change
-  /// dump in steps of a nanosecond.
+  /// Writes the clock at the chip's pin, the data of host and encoder on their pair, and the direction, as a value
+  /// change dump in steps of a nanosecond.
   void write_vcd(std::ostream& file) const;
 
  private:

@@ -189,7 +189,8 @@ void judge_clocks(const Case& one, std::vector<Finding>& findings) {
   const auto half_ns = [](const ClockTrial& trial) { return 500'000'000 / trial.rate; };
   std::string but;
   const auto add = [&but](const ClockTrial& trial) {
-    but += fmt::format("{} {} of {} at {} Hz", but.empty() ? ", but only" : " and", trial.good, trial.tried, trial.rate);
+    but +=
+        fmt::format("{} {} of {} at {} Hz", but.empty() ? ", but only" : " and", trial.good, trial.tried, trial.rate);
   };
   if (slowest != clocks.begin()) add(*std::prev(slowest));
   std::string cause = "no faster clock that was tried is too fast for encoder and cable";

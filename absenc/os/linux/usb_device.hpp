@@ -23,8 +23,8 @@ namespace absenc::os {
 /// Returns the error of a chip that this user may not open; its text names the udev rule.
 [[nodiscard]] Failure ftdi_no_permission(const FtdiAdapter& adapter);
 
-/// The chips of this computer as /sys lists them; `open` throws Failure `unsupported`. os/linux/ftdi opens them, so that
-/// programs without it need no libftdi.
+/// The chips of this computer as /sys lists them; `open` throws Failure `unsupported`. os/linux/ftdi opens them, so
+/// that programs without it need no libftdi.
 struct ListedFtdi : FtdiUsb {
   [[nodiscard]] std::vector<FtdiAdapter> adapters() override;
   [[nodiscard]] std::unique_ptr<FtdiChannel> open(const FtdiAdapter& adapter, char channel) override;
