@@ -69,7 +69,7 @@ ARCHITECTURES = {one.name: one for one in (
 )}
 # The packages whose headers and libraries a cross-compiler needs.
 SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
-    libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
+    libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
     libmosquitto-dev libpython3.11-dev libjs-dygraphs""".split()
 
 
@@ -156,7 +156,7 @@ class Release:
     def static_artefacts(self, architecture):
         say(f"the tarball and the wheel for {architecture.name}")
         tree = self.tree(architecture, "static", "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
-                         "-DABSENC_HDF5=OFF")
+                         "-DABSENC_FTDI=OFF", "-DABSENC_HDF5=OFF")  # Debian has no static libudev, which libusb needs
         self.build(tree, "absenc-command", "absenc-manual", "absenc-python")
         self.tarball(architecture, tree)
         if architecture.name != "armhf":  # wheels are hardly used on 32-bit ARM, so none is built
@@ -308,7 +308,8 @@ Nothing needs to be installed: run bin/absenc. To have its man pages and complet
     source share/bash-completion/completions/absenc
 
 This program is linked statically and runs on any Linux since Debian 11. It has every verb but these, for which the
-Debian packages are: serve (absenc-serve), record to HDF5 (absenc-hdf5) and emulate --spidev (absenc).
+Debian packages are: serve (absenc-serve), record to HDF5 (absenc-hdf5) and emulate --spidev (absenc). Ports of FTDI
+chips (ftdi:) are in the package absenc.
 `absenc doctor`, `read`, `scan`, `identify`, `conform`, `decode`, `emulate` and `record` to CSV or JSON lines work.
 LICENSE is that of absenc, licences/ has those of the libraries inside. The libraries under the LGPL (glibc, libgpiod)
 can be replaced by building absenc from its sources, which are published beside this archive.
