@@ -70,7 +70,7 @@ ARCHITECTURES = {one.name: one for one in (
 # The packages whose headers and libraries a cross-compiler needs.
 SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
     libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
-    libmosquitto-dev libpython3.11-dev libjs-dygraphs""".split()
+    libmosquitto-dev libpython3.11-dev pybind11-dev libjs-dygraphs""".split()
 
 
 def run(*command, **settings):

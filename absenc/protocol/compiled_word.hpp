@@ -17,7 +17,7 @@ namespace absenc {
 /// A word format compiled into shifts and masks. Decoding with it gives the same values as `decode_word`.
 class CompiledWord {
  public:
-  /// Greatest number of bits of a word together with the bits that follow it.
+  /// Greatest number of bits of a word and of the bits behind it in the same number, together.
   static constexpr unsigned maximum_bits = 64;
 
   constexpr CompiledWord() = default;

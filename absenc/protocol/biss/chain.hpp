@@ -17,7 +17,8 @@ struct ChainFormat {
   std::uint8_t slave = 0;
   RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
-  /// Whether SLO of a virtual encoder stays idle until the start sequence.
+  /// Whether SLO of a virtual encoder stays idle after power on until the host has sent the start sequence (two pulses
+  /// of MA between pauses of 40 us).
   bool start_sequence = false;
   Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
   /// How a virtual encoder sets the bit P after each register (1: the next register is refused).

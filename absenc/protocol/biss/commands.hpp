@@ -98,7 +98,7 @@ inline constexpr auto register_order_option = author::option<member>(
 template <auto member>
 inline constexpr auto register_delay_option = author::option<member>(
     "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535);
-/// Option of the virtual encoder: whether it stays idle until the start sequence.
+/// Option of the virtual encoder: whether it stays idle until the host has sent the start sequence.
 template <auto member>
 inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");

@@ -20,7 +20,9 @@ struct Behaviour {
   Time edge_noise = 20ns;
   /// Time from the host's request for a register until the virtual encoder can send or take the register's value.
   Time register_delay{};
-  bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
+  /// Whether SLO stays idle after power on until the host has sent the start sequence (two pulses of MA between pauses
+  /// of 40 us).
+  bool start_sequence = false;
 };
 
 /// Samples of SLO, one per clock of MA.

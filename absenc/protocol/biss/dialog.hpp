@@ -29,7 +29,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   }
   /// Sets the CDM bit that the host sends after the frame that was received last.
   void set_cdm(bool cdm) { cdm_ = cdm; }
-  /// Returns the number of received frames, except a stuck frame that caused the start sequence.
+  /// Returns the number of received frames, except a stuck frame after which the host sent the start sequence.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   /// Returns the number of received frames that had an error.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }

@@ -47,7 +47,8 @@ struct SafetyFormat {
   Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;      ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
-  /// Whether SLO of a virtual encoder stays idle after power on until the start sequence.
+  /// Whether SLO of a virtual encoder stays idle after power on until the host has sent the start sequence (two pulses
+  /// of MA between pauses of 40 us).
   bool start_sequence = false;
   Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
   /// How a virtual encoder sets the bit P after each register (1: the next register is refused).

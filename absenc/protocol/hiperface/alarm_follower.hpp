@@ -62,8 +62,9 @@ class AlarmFollower final : public Follower {
   ReplyBytes reply_;
   std::uint32_t alarms_ = 0;  // mask of the alarms in the joined status replies
   std::uint64_t first_ = 0;   // number of the exchange with the position
-  bool is_complete_ = false;  // whether a status code came again or was no alarm, so that no further status is joined
-  bool is_new_ = false;       // whether the last exchange has completed a composed frame
+  // whether a status code came again or was no alarm, so that further status replies add no alarms to `alarms_`
+  bool is_complete_ = false;
+  bool is_new_ = false;  // whether the last exchange has completed a composed frame
 };
 
 }  // namespace absenc::hiperface
