@@ -8,6 +8,7 @@
 
 #include <cerrno>
 
+#include "absenc/os/gpio.hpp"
 #include "absenc/os/linux/testing.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
