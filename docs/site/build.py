@@ -24,7 +24,7 @@ CONTENTS = {
             "docs/test-a-drive", "docs/clock-cable", "man/absenc.1"],
     "Program": ["docs/cpp", "cpp-reference", "docs/python", "python-reference", "docs/firmware", "docs/drive"],
     "Encoders": ["docs/encoders", "absenc/protocol/*/README", "docs/add-an-encoder", "docs/write-a-unit", "docs/line-faults", "docs/dump-format"],
-    "Project": ["docs/architecture", "docs/benchmarks", "CONTRIBUTING", "tests/abuse/README"],
+    "Project": ["docs/architecture", "docs/benchmarks", "docs/stability", "CONTRIBUTING", "tests/abuse/README"],
 }
 
 
