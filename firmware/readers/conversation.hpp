@@ -3,6 +3,7 @@
 // instructions.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -32,6 +33,7 @@ bool converse(Reader& reader, std::span<const Item> reply, Delivery delivery) {
   using Kind = typename Event<Item>::Kind;
   Time now{1'000'000};
   std::span<const Item> remaining{};
+  std::size_t clocked = 0;  // number of bits that the host clocks out of the encoder
   for (unsigned events = 0; events < 1000; ++events) {
     const Step<Item> step = reader.next(now);
     if (step.kind == Step<Item>::Kind::done || step.kind == Step<Item>::Kind::emit) return reader.reading() != nullptr;
@@ -40,9 +42,11 @@ bool converse(Reader& reader, std::span<const Item> reply, Delivery delivery) {
     if (step.kind == Step<Item>::Kind::transfer) {
       event.kind = Kind::sent;
       remaining = reply;
+      clocked = step.bits - step.out_bits;
     } else if (!remaining.empty()) {
       event.kind = Kind::received;
       event.items = delivery == Delivery::whole ? remaining : remaining.first(1);
+      event.bits = std::min(clocked, 8 * event.items.size());
       remaining = remaining.subspan(event.items.size());
     } else if (step.at > now && step.at != never) {
       event.kind = Kind::timer;

@@ -182,7 +182,7 @@ Part<bool> know_resolution(Dialog& dialog) {
   const unsigned bits = count & 0x3F;
   if ((type & rotary_type) == 0) {
     format.position_bits = static_cast<std::uint8_t>(bits);
-    format.unit_pm = std::int64_t{steps} * 1000;
+    format.unit_um = static_cast<double>(steps) / 1000;
   } else {
     format.multiturn_bits = static_cast<std::uint8_t>(bits_of_power(revolutions));
     format.singleturn_bits = static_cast<std::uint8_t>(bits_of_power(steps));

@@ -76,8 +76,7 @@ void VirtualEncoder::write_parameters() {
   store(clock_count_word, static_cast<std::uint16_t>(clock_count_marker | format_.bits()));
   store(type_word, linear ? 0x4000 : turns ? 0xE000 : 0xC000);
   // A linear encoder states lengths in nm.
-  const std::uint64_t steps =
-      linear ? static_cast<std::uint64_t>(format_.unit_pm / 1000) : std::uint64_t{1} << format_.singleturn_bits;
+  const std::uint64_t steps = linear ? format_.unit_pm() / 1000 : std::uint64_t{1} << format_.singleturn_bits;
   const std::uint64_t periods =
       linear ? steps * counts_of_linear_period
              : std::min<std::uint64_t>(signal_periods, std::uint64_t{1} << format_.singleturn_bits);

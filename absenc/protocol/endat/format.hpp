@@ -30,7 +30,7 @@ struct Format {
   std::uint8_t singleturn_bits = 0;  ///< Bits of the position within the turn; 0: asked from the encoder, or linear.
   std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
   std::uint8_t position_bits = 0;    ///< Bits of a linear encoder's position; 0: rotary.
-  std::int64_t unit_pm = 0;          ///< Picometres per count of a linear encoder; 0: not given.
+  double unit_um = 0;                ///< Micrometres per count of a linear encoder; 0: not given.
   CommandSet version = CommandSet::v22;  ///< Version whose commands are used.
   std::uint16_t clock_khz = 1000;        ///< Rate of the clock, 100 to 16 000 kHz.
   Time latency = 10us;                   ///< Longest time from the first falling edge until the position is calculated.
@@ -52,9 +52,11 @@ struct Format {
   [[nodiscard]] constexpr unsigned bits() const {
     return is_linear() ? position_bits : unsigned{singleturn_bits} + multiturn_bits;
   }
+  /// Returns the whole picometres per count of a linear encoder; 0: not given.
+  [[nodiscard]] constexpr std::uint64_t unit_pm() const { return static_cast<std::uint64_t>(unit_um * 1e6 + 0.5); }
   /// Returns the resolution of the encoder.
   [[nodiscard]] constexpr Resolution resolution() const {
-    if (is_linear()) return {.singleturn_bits = position_bits, .unit_um = static_cast<double>(unit_pm) / 1e6};
+    if (is_linear()) return {.singleturn_bits = position_bits, .unit_um = unit_um};
     return {.singleturn_bits = singleturn_bits, .multiturn_bits = multiturn_bits};
   }
   /// Returns the period of the clock.

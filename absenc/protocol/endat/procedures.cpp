@@ -178,7 +178,7 @@ Part<std::uint64_t> counts_of_period(Dialog& dialog, std::uint8_t& selected) {
   if (periods == 0) co_return 0;
   // A linear encoder states the length of a signal period in nm.
   if (format.is_linear()) {
-    const auto unit = static_cast<std::uint64_t>(format.unit_pm);
+    const std::uint64_t unit = format.unit_pm();
     co_return unit == 0 || periods * 1000 % unit != 0 ? 0 : periods * 1000 / unit;
   }
   const std::uint64_t counts = std::uint64_t{1} << format.singleturn_bits;

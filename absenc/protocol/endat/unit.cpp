@@ -174,12 +174,17 @@ constexpr std::array<std::string_view, 2> version_names{"2.1", "2.2"};
 constexpr std::array<std::string_view, 2> recovery_names{"long", "short"};
 constexpr std::array<std::string_view, 2> shift_names{"subtracted", "added"};
 
+// The values of the options: those of the format, but the unit of length as a whole number.
+struct Given : Format {
+  std::int64_t unit_pm = 0;
+};
+
 constexpr auto options = OptionsOf{
     option<&Format::singleturn_bits>(
         "singleturn_bits", "bits of the position within the turn; 0: asked from the encoder (decode: 25)", 0, 40),
     option<&Format::multiturn_bits>("multiturn_bits", "bits of the turns; 0: none, or asked", 0, 16),
     option<&Format::position_bits>("position_bits", "linear encoders: bits of the position", 0, 40),
-    decimal<6>(option<&Format::unit_pm>("unit_um", "linear encoders: um per count", 0, 1'000'000'000)),
+    decimal<6>(option<&Given::unit_pm>("unit_um", "linear encoders: um per count", 0, 1'000'000'000)),
     option<&Format::version>("version", "of EnDat, whose commands are used", version_names),
     with_role<Role::rate>(option<&Format::clock_khz>("clock_khz", "rate of the clock, kHz", 100, 16'000)),
     decimal<3>(
@@ -192,6 +197,13 @@ constexpr auto options = OptionsOf{
                                   mrs::stop_info_2 - 1)),
     option<&Format::datum_shift>("datum_shift", "how the encoder applies its datum shift", shift_names),
 };
+
+constexpr Format format_by(const Options& values) {
+  const Given given = options.format(values);
+  Format format = given;
+  format.unit_um = static_cast<double>(given.unit_pm) / 1e6;
+  return format;
+}
 
 constexpr auto models = std::array{
     ModelText{"asked", "resolution asked from the encoder", 0, "singleturn_bits=0"},
@@ -207,7 +219,7 @@ constexpr bool is_possible(const Format& format) {
   const bool selects_1 = format.info1 == 0 || format.info1 >= mrs::nothing;
   const bool selects_2 = format.info2 == 0 || format.info2 >= mrs::nothing_2;
   const bool both = format.is_linear() && format.singleturn_bits + format.multiturn_bits != 0;
-  const bool is_scaled = !format.is_linear() || format.unit_pm > 0;
+  const bool is_scaled = !format.is_linear() || format.unit_um > 0;
   return selects_1 && selects_2 && !both && is_scaled && format.bits() <= most_bits &&
          (format.version == CommandSet::v22 || std::uint32_t{format.clock_khz} * 1000 <= fastest_21);
 }
@@ -217,11 +229,11 @@ constexpr Resolution resolution_by(const Format& format) { return with_resolutio
 // A reply without its request is taken to be that of a position of the version, as far as the bits allow.
 constexpr Result<Request> guess_request(const Format& format, BitView) { return ask_for_position(format); }
 
-BitRanges host_bits(const Options& values, Frame burst) { return host_ranges(options.format(values), to_bits(burst)); }
+BitRanges host_bits(const Options& values, Frame burst) { return host_ranges(format_by(values), to_bits(burst)); }
 
 // The checksums cover neither the zeros before the start bit, nor the start bits, nor what follows the last checksum.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
-  const Format format = options.format(values);
+  const Format format = format_by(values);
   const BitView bits = to_bits(reply);
   Request asked = ask_for_position(format);
   if (!request.bytes.empty()) asked = decode_request(to_bits(request)).value_or(asked);
@@ -242,7 +254,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .known_as = known_as,
     .link = LinkKind::clocked_bidirectional,
     .options = options.infos,
-    .format = format_of<options>,
+    .format = format_by,
     .models = models,
     .fields = fields.infos,
     .commands = commands,
