@@ -101,6 +101,7 @@ class Session {
     const FirstReading before = first_;
     std::optional<BadExchange<Item>> suspect;
     constexpr unsigned most = 11;
+    const Time begun = port_->now();
     for (unsigned number = 1;; ++number) {
       confirmed_ = false;
       const Conversation<Item>* conversation = next(command);
@@ -115,8 +116,10 @@ class Session {
         known_ = true;
         return conversation;
       }
-      // Without a valid position the encoder may be starting, so it is read again, unless one was confirmed before.
-      if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
+      // Without a valid position the encoder may be starting, so it is read again, unless one was confirmed before, or
+      // readings are so slow that their user would wait for it.
+      const bool has_waited = known_ || port_->now() - begun > invalid_limit;
+      if (number == most || (has_waited && !FirstReading::has_position(*reading))) return conversation;
     }
   }
   /// Reads the position with `command`, without a callback for each reading.
@@ -164,6 +167,7 @@ class Session {
     confirmed_ = false;
     known_ = false;
     streaming_ = false;
+    learned_.reset();
     shortest_interval_ = never;
     first_.start_again();
   }
@@ -180,8 +184,14 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
+  // No encoder is unplugged, and another one connected and started, in less time.
+  static constexpr Time learned_limit = std::chrono::milliseconds(500);
+  // Time after which a position that is not valid is no longer read again at once.
+  static constexpr Time invalid_limit = std::chrono::milliseconds(50);
+
   // Forgets the stored positions, because those read with other options or another speed limit are not comparable.
   void follow_options() {
+    learned_.reset();
     first_ = FirstReading(reach());
     apart_ = Apart(times());
   }
@@ -230,8 +240,10 @@ class Session {
       if (statistics_ != nullptr) statistics_->add(*conversation);
       if (error == Error::none) {
         ++counters_.good;
+        learn(command, *conversation);
         return conversation;
       }
+      learned_.reset();
       ++counters_.errors[static_cast<std::size_t>(error)];
       // after a timeout the first position must be confirmed anew, because the encoder may have been switched off
       if (error == Error::timeout) doubt();
@@ -254,7 +266,18 @@ class Session {
 
   Conversation<Item>* make(const Command& command, Arguments arguments) {
     discarded_before_ = 0;
-    return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
+    const bool knows = learned_ && command.verb == Verb::read && port_->now() - learned_at_ < learned_limit;
+    return current_ = unit_->host(knows ? *learned_ : options_, command, arguments, storage_).template of<Item>();
+  }
+
+  // Stores what a reading shows of the encoder, so that the next reading need not ask for it. It is forgotten after an
+  // error, after a change of the encoder, and if no reading follows before another encoder could have taken its place.
+  void learn(const Command& command, const Conversation<Item>& conversation) {
+    if (command.changes_encoder) learned_.reset();
+    const Reading* const reading = conversation.reading();
+    if (unit_->learned == nullptr || command.verb != Verb::read || reading == nullptr) return;
+    learned_.emplace(unit_->learned(options_, *reading));
+    learned_at_ = port_->now();
   }
 
   // Returns whether replies to this command pass the reply guard. Where the host drives the clock they do not, because
@@ -323,6 +346,8 @@ class Session {
   bool confirmed_ = false;              // true: the position of the last reading was confirmed
   bool known_ = false;                  // true: a position was confirmed since the last call of `doubt`
   bool streaming_ = false;              // the present conversation has stopped at a result and can continue
+  std::optional<Options> learned_;      // options with what the last reading showed; nothing: the encoder is asked
+  Time learned_at_{};                   // time of that reading
   std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream that were already counted
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;

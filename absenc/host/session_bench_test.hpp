@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session with a virtual T-format encoder, in virtual time, for tests.
+// A session with a virtual encoder, of T-format or another unit, in virtual time, for tests.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "absenc/host/session.hpp"
@@ -31,7 +32,8 @@ struct Still final : Shaft {
 /// A virtual encoder with faults at given rates, by default none, a port to it, and a session.
 struct Bench {
   explicit Bench(EchoMode mode, sim::FaultRates rates = {}, unsigned attempts = 3,
-                 const std::vector<OptionText>& settings = {}) {
+                 const std::vector<OptionText>& settings = {}, std::string_view id = "tformat")
+      : unit(*find_unit(id)) {
     EXPECT_EQ(resolve_options(unit, {}, settings, options).kind, OptionError::Kind::none);
     device_storage.resize(unit.device_storage);
     host_storage.resize(unit.host_storage);
@@ -39,7 +41,7 @@ struct Bench {
     device->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     shaft.device = device;
     faulty = std::make_unique<sim::FaultyDevice>(*device, rates, 1);
-    port = std::make_unique<sim::SimPort<std::uint8_t>>(unit.link, unit.line, *faulty);
+    port = std::make_unique<sim::SimPort<std::uint8_t>>(unit.link, line_settings(unit, options), *faulty);
     session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
   }
   const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
@@ -59,7 +61,7 @@ struct Bench {
     return session->counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
   }
 
-  const Unit& unit = *find_unit("tformat");
+  const Unit& unit;
   Options options;
   Still shaft;
   std::vector<std::byte> device_storage;

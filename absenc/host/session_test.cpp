@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdio>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -246,6 +247,82 @@ TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   EXPECT_EQ(reading.error(), Error::none);
   EXPECT_FALSE(reading.reading()->singleturn_valid());
   EXPECT_FALSE(bench.session->confirmed());
+}
+
+TEST(Session, ReadsInvalidPositionAgainOnlyForAShortTime) {
+  Bench bench(EchoMode::off, {}, 3, {{"singleturn_bits", "25"}}, "endat");
+  bench.device->raise_alarms(0x01);  // the words with the alarms are read behind each position: some 40 ms
+  EXPECT_FALSE(bench.read().reading()->singleturn_valid());
+  EXPECT_LT(bench.port->now(), 120ms);
+  EXPECT_GT(bench.port->now(), 60ms) << "it is read a second time";
+}
+
+// ---- Resolution that the encoder is asked for
+
+/// The place of an encoder on the line, in which the test exchanges encoders.
+struct Socket final : Machine<std::uint8_t> {
+  void feed(const Event<std::uint8_t>& event) override { encoder->feed(event); }
+  Step<std::uint8_t> next(Time now) override { return encoder->next(now); }
+  Machine<std::uint8_t>* encoder = nullptr;
+};
+
+/// A session that asks virtual EnDat encoders of 25 and of 13 bits, of which the first is connected, for the
+/// resolution.
+struct AskingBench {
+  AskingBench()
+      : wide(EchoMode::off, {}, 3, {{"singleturn_bits", "25"}}, "endat"),
+        narrow(EchoMode::off, {}, 3, {{"singleturn_bits", "13"}, {"version", "2.2"}}, "endat") {
+    socket.encoder = wide.device;
+    EXPECT_EQ(resolve_options(wide.unit, {}, {}, options).kind, OptionError::Kind::none);
+    port.emplace(wide.unit.link, line_settings(wide.unit, options), socket);
+    session.emplace(wide.unit, options, *port, wide.host_storage, EchoMode::off);
+  }
+  /// Reads once, expects a position of `bits` bits, and returns the number of exchanges that this took.
+  std::uint64_t exchanges(unsigned bits) {
+    const std::uint64_t before = wide.device->answer_count() + narrow.device->answer_count();
+    const Conversation<std::uint8_t>& read = *session->read(*find_command(wide.unit, Verb::read));
+    EXPECT_EQ(read.error(), Error::none);
+    EXPECT_EQ(read.reading() != nullptr ? read.reading()->singleturn_bits : 0, bits);
+    return wide.device->answer_count() + narrow.device->answer_count() - before;
+  }
+
+  Bench wide;
+  Bench narrow;
+  Socket socket;
+  Options options;
+  std::optional<sim::SimPort<std::uint8_t>> port;
+  std::optional<Session<std::uint8_t>> session;
+};
+constexpr std::uint64_t asking = 8;  // two selections, five words, position
+
+TEST(SessionLearns, AsksForResolutionOnce) {
+  AskingBench bench;
+  EXPECT_EQ(bench.exchanges(25), asking + 1) << "a second position confirms the first";
+  const Time begin = bench.port->now();
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.exchanges(25), 1u);
+  EXPECT_LT(bench.port->now() - begin, 1ms);
+}
+
+TEST(SessionLearns, AsksAgainAfterAPauseOrAChange) {
+  AskingBench bench;
+  bench.exchanges(25);
+  bench.port->line().run_until(bench.port->now() + 499ms);
+  EXPECT_EQ(bench.exchanges(25), 2u) << "after a pause a second position confirms the first";
+  bench.port->line().run_until(bench.port->now() + 501ms);
+  EXPECT_EQ(bench.exchanges(25), asking + 1);
+  bench.session->run(*find_command(bench.wide.unit, "reset"));
+  EXPECT_EQ(bench.exchanges(25), asking + 1);
+  bench.session->doubt();
+  EXPECT_EQ(bench.exchanges(25), asking + 1);
+}
+
+TEST(SessionLearns, NoticesExchangedEncoder) {
+  AskingBench bench;
+  bench.exchanges(25);
+  bench.socket.encoder = bench.narrow.device;
+  bench.exchanges(13);
+  EXPECT_GT(bench.session->counters().bad(), 0u) << "the reply of another length has a wrong checksum";
+  EXPECT_EQ(bench.exchanges(13), 1u);
 }
 
 // ---- Confirmation

@@ -376,6 +376,9 @@ struct Unit {
   /// Returns the reading `now`, completed by alarms of `before`, the completed reading before it. Null: readings are
   /// not completed.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
+  /// Returns `options` with the properties that this reading shows, where `options` leave it to the host to ask the
+  /// encoder for them. Null: hosts ask for nothing, or readings do not show it.
+  Options (*learned)(const Options& options, const Reading& reading) = nullptr;
   /// Constructs a Follower in `storage` of `follower_storage` bytes, aligned for any type. Null: the unit has none.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t follower_storage = 0;  ///< Bytes of storage that `follower` needs; 0: there is none.

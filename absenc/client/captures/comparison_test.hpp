@@ -97,7 +97,6 @@ class Comparison {
     }
     for (std::size_t i = 0; i < live.answer.columns.size(); ++i) {
       const std::string name(live.answer.columns[i].name);
-      if (!composes() && unit_.alarms != nullptr && name == unit_.alarms->name) continue;
       const auto found = told.find(name);
       if (found == told.end() && live.reads && live.exchanges != 0) return "no row has " + name;
       if (found != told.end() && !agree(name, found->second, client::to_text(live.answer.values[i]))) {
@@ -117,11 +116,6 @@ class Comparison {
     if (!is_of_exchange) return of_rows.back() == live;
     return std::find(of_rows.begin(), of_rows.end(), live) != of_rows.end();
   }
-
-  // Returns whether a capture can compose several exchanges into one result: only exchanges of bytes can be composed.
-  // On a bidirectional clocked line, alarms that the host reads as words of the memory are therefore missing in every
-  // row that has a position.
-  [[nodiscard]] bool composes() const { return unit_.link != LinkKind::clocked_bidirectional; }
 
   [[nodiscard]] bool is_of(const Said& row, const Reading& reading) const {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
@@ -149,10 +143,6 @@ class Comparison {
       }
     }
     Reading known = *live.reading;
-    if (!composes()) {
-      known.alarms &= all.alarms_reported;
-      known.alarms_reported &= all.alarms_reported;
-    }
     // A command that only this unit has may leave out turns that its reply carries; for example, a safe position is
     // reported without turns.
     if (live.is_special && known.multiturn_bits == 0) {

@@ -102,6 +102,8 @@ struct Declaration {
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
+  /// Returns the options with the properties that a reading shows; null: readings show none that hosts ask for.
+  Options (*learned)(const Options&, const Reading&) = nullptr;
   /// Constructs a Follower, which finds frames that are composed of several exchanges; null: there are no such frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
   /// Number of bytes of storage that `follower` needs for the Follower that it constructs.

@@ -119,6 +119,7 @@ bool streams(const Options&) { return true; }
 ExtraWires wires(const Options&) { return {}; }
 std::optional<std::size_t> control_bit(const Options&, Frame) { return 7; }
 Reading remembered(const Reading& before, Reading) { return before; }
+Options learned(const Options& known, const Reading&) { return known; }
 Follower* follower(const Options&, std::span<std::byte>) { return nullptr; }
 constexpr std::array<MemoryArea, 1> memory{{{0, 0, 1, "a byte"}}};
 constexpr std::array<RegisterInfo, 1> registers{{{"one", 1, 2}}};
@@ -159,6 +160,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .host_bits = host_bits,
     .reportable = [](const Options&) -> std::uint32_t { return 13; },
     .remembered = remembered,
+    .learned = learned,
     .follower = follower,
     .follower_storage = 5,
     .status = &fields.infos[0],
@@ -197,6 +199,7 @@ TEST(Declaration, LeavesOutUndeclaredMembers) {
   EXPECT_EQ(unit.extra_wires, nullptr);
   EXPECT_EQ(unit.control_bit, nullptr);
   EXPECT_EQ(unit.remembered, nullptr);
+  EXPECT_EQ(unit.learned, nullptr);
   EXPECT_EQ(unit.follower, nullptr);
   EXPECT_EQ(unit.over_spi, nullptr);
   EXPECT_TRUE(unit.memory.empty() && unit.registers.empty() && unit.conditions.empty());
@@ -242,6 +245,7 @@ TEST(Declaration, SetsEachMemberOfTheUnit) {
   EXPECT_EQ(whole_unit.extra_wires, wires);
   EXPECT_EQ(whole_unit.control_bit, control_bit);
   EXPECT_EQ(whole_unit.remembered, remembered);
+  EXPECT_EQ(whole_unit.learned, learned);
   EXPECT_EQ(whole_unit.follower, follower);
   EXPECT_EQ(whole_unit.follower_storage, 5u);
   EXPECT_EQ(whole_unit.status, &fields.infos[0]);

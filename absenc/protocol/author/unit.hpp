@@ -421,6 +421,7 @@ struct Descriptor {
               .control_bit = declared.control_bit,
               .host_bits = declared.host_bits,
               .remembered = declared.remembered,
+              .learned = declared.learned,
               .follower = declared.follower,
               .follower_storage = declared.follower_storage};
     if constexpr (declared.report.explain != nullptr) unit.explain = explain;

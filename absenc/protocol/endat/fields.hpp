@@ -169,7 +169,7 @@ constexpr void add_position(Values& all, const Format& given, const Reply& reply
 /// Returns the values of the fields of a valid reply.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Request& request, const Reply& reply) {
   Values all = values_of(request);
-  all.start = reply.start;
+  if (!request.with_alarms) all.start = reply.start;
   if (request.code == ModeCommand::test_values) {
     all.f1 = reply.f1;
     all.test_values = reply.position;
@@ -182,7 +182,7 @@ constexpr void add_position(Values& all, const Format& given, const Reply& reply
   } else if (request.code == ModeCommand::test || request.code == ModeCommand::communicate) {
     all.instruction = reply.word;
   }
-  if (reply.alarms_read) all.alarms = *reply.alarms_read;
+  if (reply.alarm_words) all.alarms = static_cast<std::uint16_t>(reading_of(format, request.code, reply).alarms);
   if (const Info* const info = reply.info(1)) {
     all.warning = info->warning;
     all.referenced = info->referenced;

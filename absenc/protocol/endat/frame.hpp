@@ -85,10 +85,17 @@ struct Request {
   /// Not sent: whether the host clocks on for two additional informations, of which it does not know if they are
   /// selected.
   bool seeks_infos = false;
+  /// Whether this is a composed request of a capture: behind the position the host reads error messages and warnings.
+  bool with_alarms = false;
 
   /// Returns whether two requests are equal.
   friend constexpr bool operator==(const Request&, const Request&) = default;
 };
+
+/// Requests that a host sends behind a position to read the error messages and the warnings.
+inline constexpr std::array<Request, 3> alarm_requests{{{.code = ModeCommand::select, .byte = area::status},
+                                                        {.code = ModeCommand::read, .byte = error_word.address},
+                                                        {.code = ModeCommand::read, .byte = warning_word.address}}};
 
 /// One additional information of a reply.
 struct Info {
@@ -102,6 +109,15 @@ struct Info {
   friend constexpr bool operator==(const Info&, const Info&) = default;
 };
 
+/// Words of the operating status, which a host reads behind a position.
+struct AlarmWords {
+  std::uint16_t errors = 0;    ///< Error messages, word 0.
+  std::uint16_t warnings = 0;  ///< Warnings, word 1.
+
+  /// Returns whether the words are equal.
+  friend constexpr bool operator==(const AlarmWords&, const AlarmWords&) = default;
+};
+
 /// Content of a reply; members that the request does not ask for are 0.
 struct Reply {
   std::uint64_t position = 0;   ///< Turns above the position within the turn; of test values: their 40 bits.
@@ -112,8 +128,8 @@ struct Reply {
   std::uint16_t word = 0;       ///< Content of the word, or the repeated 16 bits.
   std::uint16_t start = 0;      ///< Clocks of the exchange before the start bit.
   std::array<Info, 2> infos{};  ///< Additional informations, in the order of the line: 2 before 1.
-  /// Not part of the reply: alarms that the host read behind a position with an error.
-  std::optional<std::uint16_t> alarms_read{};
+  /// Not part of the reply: error messages and warnings that the host read behind the position.
+  std::optional<AlarmWords> alarm_words{};
 
   /// Returns the additional information 1 or 2; null: it was not sent.
   [[nodiscard]] constexpr const Info* info(unsigned number) const {
@@ -129,11 +145,14 @@ struct Reply {
 
 // ---- Sizes, in bits
 
-inline constexpr std::size_t lead_bits = 2;         ///< Clocks before the mode command (2T).
-inline constexpr std::size_t command_bits = 8;      ///< Clocks of a request without parameters.
-inline constexpr std::size_t parameter_bits = 24;   ///< MRS code, address or port, and 16 bits.
-inline constexpr std::size_t turn_bits = 2;         ///< Clocks in which the data line turns (2T).
-inline constexpr std::size_t crc_bits = 5;          ///< Bits of the checksum.
+inline constexpr std::size_t lead_bits = 2;        ///< Clocks before the mode command (2T).
+inline constexpr std::size_t command_bits = 8;     ///< Clocks of a request without parameters.
+inline constexpr std::size_t parameter_bits = 24;  ///< MRS code, address or port, and 16 bits.
+inline constexpr std::size_t turn_bits = 2;        ///< Clocks in which the data line turns (2T).
+inline constexpr std::size_t crc_bits = 5;         ///< Bits of the checksum.
+/// Bits of a request with parameters; also those of its reply, if the access takes no time.
+inline constexpr std::size_t access_bits = command_bits + parameter_bits;
+static_assert(access_bits == turn_bits + 1 + parameter_bits + crc_bits);
 inline constexpr std::size_t info_bits = 30;        ///< Bits of an additional information.
 inline constexpr std::size_t test_value_bits = 40;  ///< Bits of test values.
 /// Zeros before the start bit of a supplement; an encoder accepts any number of them.
@@ -224,6 +243,11 @@ constexpr bool is_checked(const BitView& bits, std::size_t first, std::size_t co
   return bits;
 }
 
+/// Returns whether two requests with parameters ask for the same area or word.
+[[nodiscard]] constexpr bool asks_same(const Request& a, const Request& b) {
+  return a.code == b.code && a.byte == b.byte;
+}
+
 /// Reads the supplement in `bits` from index `first` on into `request`. Returns false if it is incomplete.
 constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& request) {
   const std::size_t start = first < bits.size && !bits[first] ? bits.end_of_run(first) : first;
@@ -233,8 +257,8 @@ constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& 
   return true;
 }
 
-/// Decodes the bits of a request, with those of its supplement. Errors: wrong_length, unexpected_reply (no mode
-/// command), out_of_range (the two clocks before the mode command are not 0).
+/// Decodes the bits of a request, with those of its supplement, or a composed request of a capture. Errors:
+/// wrong_length, unexpected_reply (no mode command), out_of_range (the two clocks before the mode command are not 0).
 [[nodiscard]] constexpr Result<Request> decode_request(const BitView& bits) {
   if (bits.size < command_bits) return Error::wrong_length;
   const auto code = static_cast<std::uint8_t>(bits.load(lead_bits, 6));
@@ -243,6 +267,15 @@ constexpr bool take_supplement(const BitView& bits, std::size_t first, Request& 
   Request request{.code = static_cast<ModeCommand>(code)};
   if (has_supplement(request.code)) {
     if (!take_supplement(bits, command_bits, request)) return Error::wrong_length;
+    return request;
+  }
+  if (bits.size == command_bits + alarm_requests.size() * access_bits && has_position(request.code)) {
+    for (std::size_t i = 0; i < alarm_requests.size(); ++i) {
+      const Bytes bytes = bits.bytes.subspan((command_bits + i * access_bits) / 8, access_bits / 8);
+      const Result<Request> one = decode_request({bytes, access_bits});
+      if (!one || !asks_same(*one, alarm_requests[i])) return Error::wrong_length;
+    }
+    request.with_alarms = true;
     return request;
   }
   if (bits.size != request_size(request.code)) return Error::wrong_length;
@@ -295,9 +328,8 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
 }
 }  // namespace detail
 
-/// Decodes a reply, which begins at the first clock behind the request. Errors: line_stuck (no start bit, or nothing
-/// but ones), truncated, bad_checksum, request_rejected (the encoder repeats another MRS code or address).
-[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, const BitView& bits) {
+/// Decodes one reply, which begins at the first clock behind the request. Errors: as `decode_reply`.
+[[nodiscard]] constexpr Result<Reply> decode_one(const Format& format, const Request& request, const BitView& bits) {
   const std::size_t start = find_start(bits);
   if (start >= bits.size || bits.end_of_run(start) == bits.size) return Error::line_stuck;
   const std::size_t first = start + 1;
@@ -330,6 +362,27 @@ constexpr Error take_infos(const BitView& bits, std::size_t first, std::size_t e
     const Error error = detail::take_infos(bits, first + covered + crc_bits, expected, request.seeks_infos, reply);
     if (error != Error::none) return error;
   }
+  return reply;
+}
+
+/// Decodes a reply, which begins at the first clock behind the request, or the composed reply to a composed request:
+/// the position up to a whole byte, then the replies to `alarm_requests` without access time. Errors: line_stuck (no
+/// start bit, or nothing but ones), truncated, bad_checksum, request_rejected (the encoder repeats another MRS code or
+/// address).
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, const BitView& bits) {
+  if (!request.with_alarms) return decode_one(format, request, bits);
+  constexpr std::size_t size = access_bits / 8;
+  if (bits.bytes.size() <= alarm_requests.size() * size) return Error::truncated;
+  const std::size_t first = bits.bytes.size() - alarm_requests.size() * size;
+  Result<Reply> reply = decode_one(format, request, {bits.bytes.first(first), 8 * first});
+  std::array<std::uint16_t, alarm_requests.size()> words{};
+  for (std::size_t i = 0; i < alarm_requests.size() && reply; ++i) {
+    const Result<Reply> one =
+        decode_one(format, alarm_requests[i], {bits.bytes.subspan(first + i * size, size), access_bits});
+    if (!one) return one;
+    words[i] = one->word;
+  }
+  if (reply) reply->alarm_words = AlarmWords{words[1], words[2]};
   return reply;
 }
 
@@ -400,7 +453,8 @@ inline constexpr std::uint32_t warning = 1u << 15;  ///< WRN: at least one warni
 }
 
 /// Completes a reading by the error messages and warnings that were read behind it.
-constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t warnings) {
+constexpr void add_alarms(Reading& reading, const AlarmWords& words) {
+  const auto [errors, warnings] = words;
   // WRN is known from additional information only, unless a warning is set.
   const bool knows_group = warnings != 0 || (reading.alarms_reported & alarm::warning) != 0;
   reading.alarms &= alarm::error | alarm::warning;
@@ -432,12 +486,14 @@ constexpr void add_alarms(Reading& reading, std::uint16_t errors, std::uint16_t 
   reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
   reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
   // Without additional information nothing tells of warnings: which alarms are raised stays open until they are read.
-  if (reply.info_count == 0) return reading;
-  reading.alarms = wrong ? alarm::error : 0;
-  reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
-  const bool warns = reply.infos[0].warning;
-  if (warns) reading.alarms |= alarm::warning;
-  reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;
+  if (reply.info_count != 0) {
+    reading.alarms = wrong ? alarm::error : 0;
+    reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
+    const bool warns = reply.infos[0].warning;
+    if (warns) reading.alarms |= alarm::warning;
+    reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;
+  }
+  if (reply.alarm_words) add_alarms(reading, *reply.alarm_words);
   return reading;
 }
 

@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
+#include <optional>
+#include <utility>
 #include <vector>
 
+#include "absenc/protocol/endat/alarm_follower.hpp"
 #include "absenc/protocol/endat/protocol.hpp"
 
 namespace absenc::endat {
@@ -76,6 +80,136 @@ TEST(EndatFrame, FindsHostsBitsInABurst) {
   EXPECT_EQ(ranges[1].first, end);
   EXPECT_EQ(ranges[1].count, supplement.size());
   EXPECT_EQ(end - start, 1 + reply_size(format, request.code));
+}
+
+// ---- Alarms in captures
+
+constexpr Format rotary{.singleturn_bits = 25};
+
+// A follower that is given exchanges with valid replies, whose start bits come `zeros` clocks late.
+struct FollowerBench {
+  void follow(const Request& request, const Reply& reply, std::size_t zeros = 3) {
+    BitBuffer<256> bits;
+    bits.append(0, static_cast<unsigned>(turn_bits + zeros));
+    encode_reply(format, request.code, reply, bits);
+    while (bits.size() < 240) bits.append(1, 1);
+    follower.follow(number++, encode_request(request).bytes(), bits.bytes());
+  }
+  void follow_word(const Request& request, std::uint16_t word) {
+    follow(request, {.byte = request.byte, .word = word}, 120);
+  }
+  void follow_alarms(std::uint16_t errors, std::uint16_t warnings) {
+    follow_word(alarm_requests[0], 0);
+    follow_word(alarm_requests[1], errors);
+    follow_word(alarm_requests[2], warnings);
+  }
+  // Returns the request and the reply of the next composed frame; nothing: there is none.
+  std::optional<std::pair<Request, Reply>> take() {
+    Composed one;
+    if (!follower.take(one)) return std::nullopt;
+    first = one.first;
+    const Result<Request> request = decode_request({one.request, 8 * one.request.size()});
+    if (!request) return std::nullopt;
+    const Result<Reply> reply = decode_reply(format, *request, {one.reply, 8 * one.reply.size()});
+    if (!reply) return std::nullopt;
+    return std::pair(*request, *reply);
+  }
+  Format format = rotary;
+  AlarmFollower follower{format};
+  std::uint64_t number = 7;
+  std::uint64_t first = 0;
+};
+
+TEST(EndatFollower, ComposesPositionWithTheAlarmsBehindIt) {
+  for (const ModeCommand code : {ModeCommand::position, ModeCommand::position_22}) {
+    for (const std::uint8_t info : std::to_array<std::uint8_t>({0, 0x4D})) {
+      FollowerBench bench{.format = {.singleturn_bits = 25, .info1 = info}};
+      Reply reply{.position = 0x1234567, .f1 = true, .f2 = code == ModeCommand::position};
+      if (code == ModeCommand::position_22 && info != 0) {
+        reply.info_count = 1;
+        reply.infos[0] = {.warning = true, .number = 0x0D, .content = 3000};
+      }
+      bench.follow({.code = code}, reply);
+      bench.follow_alarms(0x02, 0x10);
+      const auto composed = bench.take();
+      ASSERT_TRUE(composed);
+      EXPECT_TRUE(composed->first.with_alarms);
+      EXPECT_EQ(composed->first.code, code);
+      EXPECT_EQ(bench.first, 7u);
+      EXPECT_EQ(composed->second.position, 0x1234567u);
+      EXPECT_EQ(composed->second.infos, reply.infos);
+      const Reading reading = reading_of(bench.format, code, composed->second);
+      EXPECT_EQ(reading.alarms, 0x1002u | alarm::error | alarm::warning);
+      EXPECT_EQ(reading.singleturn_valid_bits, 0u);
+      EXPECT_FALSE(bench.take()) << "once only";
+    }
+  }
+}
+
+TEST(EndatFollower, NeedsTheFourExchangesInTheirOrder) {
+  FollowerBench bench;
+  const Reply position{.position = 5};
+  bench.follow_alarms(1, 1);
+  EXPECT_FALSE(bench.take()) << "no position";
+  bench.follow({.code = ModeCommand::position_22}, position);
+  bench.follow_word(alarm_requests[0], 0);
+  bench.follow_word(alarm_requests[2], 0);
+  bench.follow_word(alarm_requests[1], 0);
+  EXPECT_FALSE(bench.take()) << "another order";
+  bench.follow({.code = ModeCommand::position_22}, position);
+  bench.follow_word({.code = ModeCommand::select, .byte = area::maker_1}, 0);
+  bench.follow_word(alarm_requests[1], 0);
+  bench.follow_word(alarm_requests[2], 0);
+  EXPECT_FALSE(bench.take()) << "another area";
+  bench.follow({.code = ModeCommand::position_22}, {.position = 4});
+  bench.follow({.code = ModeCommand::position_22}, position);
+  bench.follow_word(alarm_requests[0], 0);
+  bench.follower.lose();
+  bench.follow_word(alarm_requests[1], 0);
+  EXPECT_FALSE(bench.take());
+  bench.follow_word(alarm_requests[2], 0);
+  const auto composed = bench.take();
+  ASSERT_TRUE(composed);
+  EXPECT_EQ(composed->second.position, 5u);
+  EXPECT_EQ(composed->second.alarm_words, AlarmWords{});
+  bench.follow_word(alarm_requests[2], 0);
+  EXPECT_FALSE(bench.take()) << "the words again, without a position";
+}
+
+TEST(EndatFollower, ComposedFrameIsDecodedOnlyWhole) {
+  FollowerBench bench;
+  bench.follow({.code = ModeCommand::position_22}, {.position = 5});
+  bench.follow_alarms(0x01, 0);
+  Composed one;
+  ASSERT_TRUE(bench.follower.take(one));
+  std::vector<std::uint8_t> request(one.request.begin(), one.request.end());
+  std::vector<std::uint8_t> reply(one.reply.begin(), one.reply.end());
+  const auto asked = [&request] { return decode_request({request, 8 * request.size()}); };
+  ASSERT_TRUE(asked());
+  const auto answer = [&] { return decode_reply(rotary, *asked(), {reply, 8 * reply.size()}); };
+  ASSERT_TRUE(answer());
+  EXPECT_EQ(answer()->alarm_words, (AlarmWords{1, 0}));
+  const auto error_with_wrong = [&](std::size_t bit) {
+    std::uint8_t& byte = reply[bit / 8];
+    const std::uint8_t sound = byte;
+    byte = static_cast<std::uint8_t>(sound ^ 0x80 >> bit % 8);
+    const Error error = answer().error();
+    byte = sound;
+    return error;
+  };
+  constexpr std::size_t start = turn_bits + 1;
+  const std::size_t words = 8 * reply.size() - 3 * access_bits;
+  for (std::size_t bit = 0; bit < reply_size(rotary, ModeCommand::position_22); ++bit) {
+    EXPECT_EQ(error_with_wrong(start + bit), Error::bad_checksum) << bit;
+  }
+  for (std::size_t bit = 0; bit < 3 * access_bits; ++bit) {
+    if (bit % access_bits < start) continue;
+    EXPECT_EQ(error_with_wrong(words + bit), Error::bad_checksum) << bit;
+  }
+  reply.resize(12);
+  EXPECT_EQ(answer().error(), Error::truncated);
+  request[2] = 0xA1;
+  EXPECT_EQ(asked().error(), Error::wrong_length);
 }
 
 // README.md, section "Checksum": the least number of wrong bits that the CRC may miss, by the number of bits

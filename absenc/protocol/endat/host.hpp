@@ -45,22 +45,22 @@ class ReadPosition : public author::HostOf<Protocol> {
         reading_.received = received_at();
         if (reading_.alarms == 0 && reading_.singleturn_valid_bits != 0) break;
         stage_ = Stage::area;
-        return ask({.code = ModeCommand::select, .byte = area::status});
+        return ask(alarm_requests[0]);
       case Stage::area:
         stage_ = Stage::errors;
-        return ask({.code = ModeCommand::read, .byte = error_word.address});
+        return ask(alarm_requests[1]);
       case Stage::errors:
         errors_ = HostOf::last().word;
         stage_ = Stage::warnings;
-        return ask({.code = ModeCommand::read, .byte = warning_word.address});
+        return ask(alarm_requests[2]);
       case Stage::warnings:
-        add_alarms(reading_, errors_, HostOf::last().word);
+        reply_.alarm_words = AlarmWords{errors_, HostOf::last().word};
+        add_alarms(reading_, *reply_.alarm_words);
         // An error bit without an error message may be damage that the checksum misses: the position is read again.
         if ((reading_.alarms & (alarm::errors | alarm::warnings)) == 0 && ++tries_ < most_tries) {
           stage_ = Stage::position;
           return ask(position_request_);
         }
-        reply_.alarms_read = static_cast<std::uint16_t>(reading_.alarms);
         break;
     }
     has_reading_ = true;

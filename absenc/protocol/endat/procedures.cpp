@@ -17,7 +17,7 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
   const std::uint16_t errors = co_await read_word_21(dialog, selected, error_word, "");
   const std::uint16_t warnings = co_await read_word_21(dialog, selected, warning_word, "");
   co_await dialog.rest(long_recovery);
-  add_alarms(found.reading, errors, warnings);
+  add_alarms(found.reading, {errors, warnings});
   found.alarms = static_cast<std::uint16_t>(found.reading.alarms);
   found.command.reset();  // the values are of several exchanges
   found.start.reset();

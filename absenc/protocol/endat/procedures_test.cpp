@@ -2,6 +2,7 @@
 // Commands of several requests, with a virtual encoder.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "absenc/protocol/author/unit_bench_test.hpp"
@@ -106,6 +107,39 @@ TEST(EndatProcedures, EveryAdditionalInformation) {
   EXPECT_EQ(bench.run("additional", {0x43, 0x57}).numbers.at("info2"), 0x0012);
   EXPECT_EQ(bench.run("additional", {0, 0x5A}).error, Error::request_rejected);
   EXPECT_EQ(bench.violations(), 0u) << bench.first_violation();
+}
+
+// Inverts the lowest bit of the MRS code in a position of 25 bits with one information, with a correct checksum.
+void relabel(author::testing::Wire& bytes) {
+  constexpr std::size_t first = turn_bits + 1 + 2 + 25 + crc_bits + 1;
+  constexpr std::size_t lowest_of_code = first + 3 + 4;
+  BitBuffer<400> bits;
+  for (std::size_t i = 0; i < first + parameter_bits; ++i) {
+    bits.append(BitView{bytes, 8 * bytes.size()}[i] != (i == lowest_of_code) ? 1 : 0, 1);
+  }
+  bits.append(crc_of_bits(bits.view(), first, parameter_bits), crc_bits);
+  while (bits.size() % 8 != 0) bits.append(1, 1);
+  std::copy(bits.bytes().begin(), bits.bytes().end(), bytes.begin());
+}
+
+TEST(EndatProcedures, SearchForSelectionEndsAfterTwentyPositions) {
+  for (const unsigned changing : {18u, 19u}) {
+    Bench bench("singleturn_bits=25 info1=0x4D");
+    unsigned positions = 0;
+    bench.tampered.replies([&](unsigned nth, author::testing::Wire& bytes) {
+      ++positions;
+      if (std::min(nth, changing) % 2 == 1) relabel(bytes);
+    });
+    bench.options = author::testing::options_of(endat::unit, "singleturn_bits=25");
+    const auto read = bench.run("additional", {0, 0});
+    if (changing == 18) {
+      EXPECT_EQ(read.error, Error::none) << "positions 19 and 20 agree: " << read.detail;
+    } else {
+      EXPECT_EQ(read.error, Error::cross_check_failed);
+      EXPECT_TRUE(read.says("changes from position to position")) << read.detail;
+      EXPECT_EQ(positions, 20u);
+    }
+  }
 }
 
 TEST(EndatProcedures, ZeroByDatumShift) {

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/endat/alarm_follower.hpp"
 #include "absenc/protocol/endat/device.hpp"
 #include "absenc/protocol/endat/host.hpp"
 #include "absenc/protocol/endat/procedures.hpp"
@@ -229,6 +230,26 @@ constexpr Resolution resolution_by(const Format& format) { return with_resolutio
 // A reply without its request is taken to be that of a position of the version, as far as the bits allow.
 constexpr Result<Request> guess_request(const Format& format, BitView) { return ask_for_position(format); }
 
+// Returns the options with the resolution of a reading, if they leave it to the encoder.
+Options learned(const Options& values, const Reading& reading) {
+  if (format_by(values).is_known()) return values;
+  Options now = values;
+  const auto set = [&now](std::string_view name, std::int64_t value) { now.values[options.find(name)] = value; };
+  if (is_linear(reading.unit_um)) {
+    set("position_bits", reading.singleturn_bits);
+    set("unit_um", static_cast<std::int64_t>(reading.unit_um * 1e6 + 0.5));
+  } else {
+    set("singleturn_bits", reading.singleturn_bits);
+    set("multiturn_bits", reading.multiturn_bits);
+  }
+  return now;
+}
+
+Follower* make_follower(const Options& values, std::span<std::byte> storage) {
+  if (storage.size() < sizeof(AlarmFollower)) return nullptr;
+  return new (storage.data()) AlarmFollower(format_by(values));
+}
+
 BitRanges host_bits(const Options& values, Frame burst) { return host_ranges(format_by(values), to_bits(burst)); }
 
 // The checksums cover neither the zeros before the start bit, nor the start bits, nor what follows the last checksum.
@@ -266,6 +287,9 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .guess_request = guess_request,
     .is_checked = is_checked,
     .host_bits = host_bits,
+    .learned = learned,
+    .follower = make_follower,
+    .follower_storage = sizeof(AlarmFollower),
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
