@@ -369,6 +369,24 @@ TEST(Doctor, FindingsSayWhatHelps) {
   EXPECT_THAT(bits.findings.at(0).evidence, HasSubstr("bad_checksum"));
 }
 
+TEST(Doctor, TakesTheUnitsExplanationThatMostRepliesHave) {
+  const auto examined = [](std::string_view host, const std::string& encoder) {
+    return examine_with(host, [&encoder](const EncoderAddress&) { return virtual_link(parse_address(encoder)); });
+  };
+  const std::string fast = "?singleturn_bits=25&clock_khz=8000";
+  const Examination delayed =
+      examined("endat:ftdi" + fast + "&latency_us=4", "sim:endat" + fast + "&line_delay_ns=1000");
+  ASSERT_EQ(ids(delayed), std::vector<std::string>{"always_damaged"});
+  EXPECT_THAT(delayed.findings.at(0).cause, HasSubstr("start bit came so late"));
+  EXPECT_THAT(delayed.findings.at(0).action, HasSubstr("line-delay"));
+  // The clock is so fast that the host has stopped it before the position is calculated.
+  const std::string fastest = "?singleturn_bits=13&version=2.2&clock_khz=16000&latency_us=";
+  const Examination hasty = examined("endat:ftdi" + fastest + "1", "sim:endat" + fastest + "20");
+  ASSERT_EQ(ids(hasty), std::vector<std::string>{"miso_stuck"}) << hasty.findings.at(0).sentence();
+  EXPECT_THAT(hasty.findings.at(0).cause, HasSubstr("no start bit came"));
+  EXPECT_THAT(hasty.findings.at(0).action, HasSubstr("latency_us"));
+}
+
 // ---- Healthy encoders
 
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {

@@ -51,6 +51,15 @@ bool most(const All& all, const Is& is) {
   return !all.empty() && static_cast<std::size_t>(those) * 10 >= all.size() * 8;
 }
 
+// Gives the finding the unit's explanation of the error instead of the general one, if most replies have the same.
+Finding explained(Finding found, const All& all) {
+  const Attempted& last = *all.back();
+  if (last.detail.empty() || !most(all, [&](const Attempted& one) { return one.detail == last.detail; })) return found;
+  found.cause = last.detail;
+  if (!last.advice.empty()) found.action = last.advice;
+  return found;
+}
+
 std::optional<Finding> stuck_data(const Case& one, const All& all) {
   if (!host_clocks(one.unit.link)) return {};
   for (const std::uint8_t level : {std::uint8_t{0x00}, std::uint8_t{0xFF}}) {
@@ -61,8 +70,9 @@ std::optional<Finding> stuck_data(const Case& one, const All& all) {
     const bool is_stuck = most(all, [](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
     if (!stuck && !(is_stuck && level == 0xFF)) continue;
     const bool no_transceiver = one.seen.data_driven == false;
-    return finding(no_transceiver ? FindingKind::transceiver_missing : FindingKind::miso_stuck,
-                   {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
+    const std::vector<std::string> values{fmt::format("{}", all.size()), level == 0 ? "0" : "1"};
+    if (no_transceiver) return finding(FindingKind::transceiver_missing, values);
+    return explained(finding(FindingKind::miso_stuck, values), all);
   }
   return {};
 }
@@ -311,8 +321,8 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   // Reports no damage if fewer than one in ten replies are damaged: then the main fault is silence, which another judge
   // reports.
   if (all.size() * 10 < one.seen.readings.size()) return;
-  findings.push_back(
-      finding(FindingKind::always_damaged, {fmt::format("{}", all.size()), errors_of(all), shown(*all.front())}));
+  findings.push_back(explained(
+      finding(FindingKind::always_damaged, {fmt::format("{}", all.size()), errors_of(all), shown(*all.front())}), all));
 }
 
 Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last, bool usually_good,

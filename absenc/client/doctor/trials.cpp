@@ -203,9 +203,19 @@ std::vector<Other> other_models(const EncoderAddress& address) {
     others.push_back({FindingKind::wrong_settings, said, fmt::format("{}", fmt::join(settings, ", ")),
                       with_options(address, options)});
   };
+  const auto is_of_models = [&](std::size_t option) {
+    return std::ranges::any_of(unit.models, [option](const Model& model) {
+      return std::ranges::any_of(model.values, [option](const OptionValue& value) { return value.option == option; });
+    });
+  };
   for (const Model& model : unit.models) {
     Options options;
-    if (resolve_options(unit, model.name, {}, options).kind == OptionError::Kind::none) add(options);
+    if (resolve_options(unit, model.name, {}, options).kind != OptionError::Kind::none) continue;
+    // What no model describes, such as the rate of a clock, stays as the user gave it.
+    for (std::size_t i = 0; i < unit.options.size(); ++i) {
+      if (!is_of_models(i)) options.values[i] = address.options[i];
+    }
+    if (is_possible(unit, options)) add(options);
   }
   if (!carries_characters(unit)) return others;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

@@ -12,11 +12,6 @@ namespace {
 /// Requirements on EnDat encoders.
 constexpr auto clauses = std::array{
     Clause{"crc", "Checksum", "five bits of CRC, inverted, over the error bits and the position", Demand::checked},
-    Clause{.id = "start",
-           .paragraph = "The line",
-           .words = "zeros, then the start bit 1, come before the reply",
-           .demand = Demand::as_drawn,
-           .errors = any_of(Error::line_stuck)},
     Clause{.id = "memory-write",
            .paragraph = "Memory",
            .words = "a word that was written is read again",
@@ -33,12 +28,6 @@ constexpr auto clauses = std::array{
            .paragraph = "Zero by datum shift",
            .words = "the datum shift makes this the zero of the turn, to a signal period",
            .demand = Demand::zero},
-    Clause{.id = "clear-alarms",
-           .paragraph = "Alarms",
-           .words = "0 written to the words of the error messages and of the warnings clears them, and nothing else",
-           .demand = Demand::reset,
-           .value = alarm::errors | alarm::warnings | alarm::error,
-           .verb = Verb::clear_alarms},
 };
 
 }  // namespace
