@@ -23,7 +23,7 @@ from typing import NamedTuple
 import mutant_rules
 
 ROOT = Path(__file__).resolve().parent.parent
-COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
+COPIED = ("CMakeLists.txt", "VERSION", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
 # Matches compiler errors that come from checks at compile time, such as a static_assert.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
