@@ -44,7 +44,7 @@ FtdiPort::FtdiPort(const std::string& place, LinkKind kind, const LineSettings& 
 }
 
 // Sends a command that no MPSSE has until the chip answers to it: what it answered before belongs to an earlier
-// program (AN 135, 5.3.1).
+// program (AN 135, "Synchronization & Bad Command Detection").
 void FtdiPort::synchronise() {
   commands_.clear();
   commands_.unknown();

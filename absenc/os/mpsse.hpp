@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of FTDI's MPSSE, the engine that shifts bits (FTDI application note AN 108; paragraphs in brackets).
+// Commands of FTDI's MPSSE, the engine that shifts bits (FTDI application note AN 108, version 1.5; paragraphs
+// in brackets).
 #pragma once
 
 #include <algorithm>
@@ -23,9 +24,9 @@ struct MpssePin {
   static constexpr std::uint8_t outputs = clock | out | select | direction;
 };
 
-/// The clock of an MPSSE: `base` / 2 / (1 + `divisor`) [3.8.2].
+/// The clock of an MPSSE: `base` / 2 / (1 + `divisor`) [3.8.1, 3.8.2].
 struct MpsseClock {
-  std::uint32_t base = 60'000'000;  // Hz; 12 MHz: the FT2232D, which has no faster one [6.1]
+  std::uint32_t base = 60'000'000;  // Hz; 12 MHz: the FT2232D, which has no faster one [3.8.1]
   std::uint16_t divisor = 0;
 
   /// Returns the clock rate in Hz, rounded to the nearest integer.
@@ -68,7 +69,7 @@ class MpsseCommands {
     add({0x81});
     ++replies_;
   }
-  /// Sets the clock's divisor [3.8.2].
+  /// Sets the clock's divisor [3.8.1, 3.8.2].
   void set_divisor(std::uint16_t divisor) {
     add({0x86, static_cast<std::uint8_t>(divisor), static_cast<std::uint8_t>(divisor >> 8)});
   }
@@ -77,7 +78,7 @@ class MpsseCommands {
   void use_fast_base() { add({0x8A, 0x8D, 0x97}); }
   /// Disconnects the loop from output to input [3.7.2].
   void end_loopback() { add({0x85}); }
-  /// A command that no MPSSE has: it answers FA and the command [3.2].
+  /// A command that no MPSSE has: it answers FA and the command [3.1].
   void unknown() {
     add({0xAA});
     replies_ += 2;
@@ -102,7 +103,7 @@ class MpsseCommands {
       append(out, at, size, whole);
     });
   }
-  /// Exchanges the bytes of `out` for as many: in SPI mode 2 with `falling`, else in mode 0 [3.3.9, 3.3.10].
+  /// Exchanges the bytes of `out` for as many: in SPI mode 2 with `falling`, else in mode 0 [3.3.9].
   void exchange(Bytes out, bool falling) {
     each(8 * out.size(), [&](std::size_t at, std::size_t size, bool) {
       command(falling ? 0x34 : 0x31, size);
@@ -140,7 +141,7 @@ class MpsseCommands {
 };
 
 /// Joins the replies to `MpsseCommands::shift_in` and `read_pins` to a row of bits. The chip sends bits that do not
-/// fill a byte in the lowest bits of one [3.3.7].
+/// fill a byte in the lowest bits of one [3.3.7, 3.3.8].
 class MpsseBits {
  public:
   explicit MpsseBits(Bytes replies) : replies_(replies) {}

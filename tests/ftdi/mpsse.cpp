@@ -7,7 +7,7 @@ namespace absenc::ftdi {
 
 namespace {
 
-// Bits of the shift commands [3.3 to 3.5].
+// Bits of the shift commands [3.2].
 constexpr std::uint8_t write_falling = 0x01, bitwise = 0x02, read_falling = 0x04, lsb_first = 0x08, writes = 0x10,
                        reads = 0x20, writes_tms = 0x40;
 
@@ -165,7 +165,7 @@ void Mpsse::shift(std::uint8_t code, std::size_t count, Bytes data) {
     unsigned sampled = 0;
     for (std::size_t i = 0; i < bits; ++i) {
       const bool tms_too = (code & writes_tms) != 0;
-      // A TMS command shifts its bits out LSB first on TMS, while TDI has bit 7 of the byte [3.5].
+      // A TMS command shifts its bits out LSB first on TMS, while TDI has bit 7 of the byte [3.5.1].
       const std::size_t place = (code & lsb_first) != 0 || tms_too ? i : 7 - i;
       const bool level = !data.empty() && (data[done / 8] >> place & 1) != 0;
       if (tms_too) {

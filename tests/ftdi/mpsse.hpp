@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An MPSSE as FTDI's application note AN 108 describes it (paragraphs in brackets), with things on its pins: for tests.
+// An MPSSE as FTDI's application note AN 108, version 1.5, describes it (paragraphs in brackets), with things on its
+// pins: for tests.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +47,7 @@ class Mpsse {
   /// Returns the number of shift commands whose edges do not suit the level at which the clock rests, as the notes
   /// "use if CLK starts at" in [3.3] demand: on a real chip their clock has other edges.
   [[nodiscard]] unsigned misused() const { return misused_; }
-  /// Returns the number of commands that no MPSSE has [3.2].
+  /// Returns the number of commands that no MPSSE has [3.1].
   [[nodiscard]] unsigned unknown() const { return unknown_; }
   /// Returns the clock rate of the last shift command in Hz.
   [[nodiscard]] double rate() const { return rate_; }
@@ -83,7 +84,7 @@ class Mpsse {
   double since_ns_ = 0;
   std::uint8_t levels_ = 0xFF, outputs_ = 0, high_levels_ = 0xFF, high_outputs_ = 0;
   std::uint32_t divisor_ = 0;
-  bool by_five_ = true;  // after reset the H chips count like the FT2232D [6.1]
+  bool by_five_ = true;  // after reset the H chips count like the FT2232D [3.8.2]
   bool loopback_ = false;
   bool three_phases_ = false;
   double rate_ = 0;

@@ -45,7 +45,7 @@ void EncoderWires::change(Time at, std::uint8_t levels, std::uint8_t outputs) {
 
 bool EncoderWires::data(Time at) {
   pass(at);
-  // The chip's pull-up of 75 kOhm needs longer than this for the pin and its wire (DS_FT232H, 5.2).
+  // The chip's pull-up of 75 kOhm needs longer than this for the pin and its wire (DS_FT232H, DC characteristics).
   constexpr Time pull_up_time = 1500ns;
   if (fault.no_transceiver) return left_at_ != Time::min() && at - left_at_ < pull_up_time ? left_ != 0 : true;
   if (fault.stuck) return *fault.stuck;
