@@ -41,6 +41,7 @@ enum class FindingKind : std::uint8_t {
   clock_too_fast,
   miso_stuck,
   transceiver_missing,
+  data_at_rest,
   clock_range,
   wrong_echo,
   wrong_address,

@@ -121,6 +121,19 @@ Examination examine_spi(const std::function<bool(const EncoderAddress&)>& unders
   });
 }
 
+// Examines a line that stays at the level of rest. `driven`: whether something drives the port's data pin, nothing if
+// the port cannot tell.
+Examination examine_ones(std::string_view text, std::optional<bool> driven) {
+  return examine_with(text, [driven](const EncoderAddress& address) {
+    auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+    const std::size_t least = address.unit->link == LinkKind::spi ? 16 : 64;  // all that one reading clocks
+    port->answer = [least](const ByteList& out) { return ByteList(std::max(out.size(), least), 0xFF); };
+    Link link = link_to(std::move(port));
+    if (driven) link.is_data_driven = [driven] { return *driven; };
+    return link;
+  });
+}
+
 std::vector<Fault> line_faults() {
   std::vector<Fault> faults;
   faults.push_back({"never_silent", [] {
@@ -137,31 +150,18 @@ std::vector<Fault> line_faults() {
                         return address.spi.speed.value_or(address.line.rate) <= address.line.rate / 4;
                       });
                     }});
-  faults.push_back({"transceiver_missing", [] {
-                      return examine_with("encolink-spi:ftdi", [](const EncoderAddress&) {
-                        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
-                        port->answer = [](const ByteList& out) {
-                          return ByteList(std::max<std::size_t>(out.size(), 16), 0xFF);
-                        };
-                        Link link = link_to(std::move(port));
-                        link.is_data_driven = [] { return false; };
-                        return link;
-                      });
-                    }});
+  for (const std::string_view unit : {"encolink-spi:ftdi", "biss:ftdi", "ssi:ftdi"}) {
+    faults.push_back({"transceiver_missing", [unit] { return examine_ones(unit, false); }});
+  }
+  faults.push_back({"data_at_rest", [] { return examine_ones("ssi:ftdi", true); }});
+  faults.push_back({"data_at_rest", [] { return examine_ones("ssi:spi:/dev/spidev0.0", {}); }});
   faults.push_back({"clock_range", [] {
                       return examine_with("biss:ftdi", [](const EncoderAddress&) {
                         return virtual_link(parse_address("sim:biss?singleturn=1234"));
                       });
                     }});
-  faults.push_back({"miso_stuck", [] {
-                      return examine_with("encolink-spi:spi:/dev/spidev0.0", [](const EncoderAddress&) {
-                        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
-                        port->answer = [](const ByteList& out) {
-                          return ByteList(std::max<std::size_t>(out.size(), 16), 0xFF);
-                        };
-                        return link_to(std::move(port));
-                      });
-                    }});
+  faults.push_back({"miso_stuck", [] { return examine_ones("encolink-spi:spi:/dev/spidev0.0", {}); }});
+  faults.push_back({"miso_stuck", [] { return examine_ones("biss:ftdi", true); }});
   faults.push_back({"wrong_echo", [] { return examine_sim("sim:tformat?echo=off&fault=echo=1"); }});
   faults.push_back({"only_echo", [] { return examine_line([](const ByteList& sent) { return sent; }); }});
   faults.push_back({"modem_answers", [] {

@@ -216,4 +216,47 @@ TEST(Doctor, RepeatedRequestsShowAdapter) {
   EXPECT_THAT(ids(judged(seen)), Contains("telnet_doubled"));
 }
 
+// A bit is sampled half a period behind the edge that changes it, on a line that turns a whole one. BiSS finds its
+// start bit behind a way of any length.
+TEST(Doctor, FailingClockShowsTheWayWhereTheBitsHaveNoStartBit) {
+  for (const auto& [unit, way] : std::vector<std::pair<std::string, std::string>>{
+           {"ssi", "the way takes 333 to 500 ns"},
+           {"endat?model=ECN-1325", "the way takes 666 to 1000 ns"},
+           {"biss", "encoder, transceivers or cable are too slow for 1500000 Hz"}}) {
+    SCOPED_TRACE(unit);
+    const EncoderAddress address = parse_address("sim:" + unit);
+    Observations seen = positions([](std::size_t) { return 5; });
+    seen.clocks = {{500'000, 5, 5}, {1'000'000, 5, 5, true}, {1'500'000, 0, 5}};
+    const Examination too_fast = judge(*address.unit, address.options, seen);
+    ASSERT_EQ(ids(too_fast), std::vector<std::string>{"clock_range"});
+    EXPECT_THAT(too_fast.findings[0].cause, HasSubstr(way));
+    EXPECT_THAT(too_fast.findings[0].action, HasSubstr("set speed=1000000 or less"));
+    EXPECT_TRUE(too_fast.healthy());
+    seen.clocks.pop_back();
+    const Examination none_failed = judge(*address.unit, address.options, seen);
+    ASSERT_EQ(ids(none_failed), std::vector<std::string>{"clock_range"});
+    EXPECT_EQ(none_failed.findings[0].action, "keep the clock");
+  }
+}
+
+TEST(Doctor, OnesAloneAreNoPositionOfWhichToBeSure) {
+  const EncoderAddress address = parse_address("sim:ssi");
+  const auto examined = [&](std::uint8_t last, std::optional<bool> driven) {
+    Observations seen = positions([](std::size_t) { return 5; }, 12);
+    for (Attempted& one : seen.readings) {
+      one.raw = one.exchange.reply.bytes = {0xFF, 0xF0};  // the last four bits are no part of the 12 of the word
+      one.exchange.reply.bits = 12;
+    }
+    seen.readings.back().raw.back() = last;
+    seen.data_driven = driven;
+    return ids(judge(*address.unit, address.options, seen));
+  };
+  EXPECT_EQ(examined(0xF0, {}), std::vector<std::string>{"data_at_rest"});
+  EXPECT_EQ(examined(0xF0, true), std::vector<std::string>{"data_at_rest"});
+  EXPECT_EQ(examined(0xF0, false), std::vector<std::string>{"transceiver_missing"});
+  // A single bit that is 0 shows that something sends.
+  EXPECT_THAT(examined(0xE0, {}), IsEmpty());
+  EXPECT_THAT(examined(0xE0, false), IsEmpty());
+}
+
 }  // namespace absenc::client

@@ -168,7 +168,7 @@ class Doctor {
     const bool may_be_settings = hardly_any_good(seen_.readings) && !seen_.never_silent && seen_.lateness == Time{};
     if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
-      if (address_.port_kind == PortKind::ftdi && any_good()) sweep_clock();
+      if (address_.port_kind == PortKind::ftdi && any_good() && !all_at_rest(seen_.readings)) sweep_clock();
       if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
       if (address_.port_kind != PortKind::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal)
         ask_once_more();

@@ -174,9 +174,14 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// A bit is sampled half a period after the clock edge at which the encoder changes it, so the lowest clock rate that
-// fails shows how long the data needs to follow the clock through cable and encoder. The host of BiSS finds the start
-// bit, so there a delay only shifts the bits by whole clocks.
+// Returns the time from the edge at which the encoder changes a bit to that at which it is sampled, in half periods of
+// the clock (FtdiPort); 0 if a longer way only shifts the bits, because the host finds their start bit (BiSS).
+unsigned sampled_after_halves(const Unit& unit) {
+  if (unit.link == LinkKind::clocked_bidirectional) return 2;
+  return unit.line.idle_clocks > 0 ? 1 : 0;
+}
+
+// The lowest clock rate that fails shows how long the data needs to follow the clock through cable and encoder.
 void judge_clocks(const Case& one, std::vector<Finding>& findings) {
   const std::vector<ClockTrial>& clocks = one.seen.clocks;
   const auto is_bad = [](const ClockTrial& trial) { return trial.good < trial.tried; };
@@ -186,7 +191,8 @@ void judge_clocks(const Case& one, std::vector<Finding>& findings) {
   auto slowest = set;
   while (slowest != clocks.begin() && !is_bad(*std::prev(slowest))) --slowest;
   const ClockTrial& fastest = *std::prev(failed);
-  const auto half_ns = [](const ClockTrial& trial) { return 500'000'000 / trial.rate; };
+  const unsigned halves = sampled_after_halves(one.unit);
+  const auto way_ns = [halves](const ClockTrial& trial) { return halves * 500'000'000u / trial.rate; };
   std::string but;
   const auto add = [&but](const ClockTrial& trial) {
     but +=
@@ -197,9 +203,11 @@ void judge_clocks(const Case& one, std::vector<Finding>& findings) {
   std::string action = "keep the clock";
   if (failed != clocks.end()) {
     add(*failed);
-    cause =
-        fmt::format("from the edge of the clock to the data the way takes {} to {} ns: transceivers, cable, encoder",
-                    half_ns(*failed), half_ns(fastest));
+    cause = halves == 0 ? fmt::format("encoder, transceivers or cable are too slow for {} Hz", failed->rate)
+                        : fmt::format(
+                              "from the edge of the clock to the data the way takes {} to {} ns: transceivers, "
+                              "cable, encoder",
+                              way_ns(*failed), way_ns(fastest));
     action = fmt::format("set speed={} or less", fastest.rate);
   }
   findings.push_back(finding(FindingKind::clock_range,
@@ -240,6 +248,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
   judge_slowness(one, findings);
+  judge_rest(one, findings);
   judge_clocks(one, findings);
 }
 

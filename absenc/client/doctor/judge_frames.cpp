@@ -15,6 +15,7 @@
 #include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/core/bit_view.hpp"
 
 namespace absenc::client {
 
@@ -60,6 +61,12 @@ Finding explained(Finding found, const All& all) {
   return found;
 }
 
+// Returns the finding for transfers in which every bit was `level`.
+Finding stuck_at(const Case& one, std::size_t transfers, bool level, FindingKind otherwise) {
+  return finding(one.seen.data_driven == false ? FindingKind::transceiver_missing : otherwise,
+                 {fmt::format("{}", transfers), level ? "1" : "0"});
+}
+
 std::optional<Finding> stuck_data(const Case& one, const All& all) {
   if (!host_clocks(one.unit.link)) return {};
   for (const std::uint8_t level : {std::uint8_t{0x00}, std::uint8_t{0xFF}}) {
@@ -69,10 +76,8 @@ std::optional<Finding> stuck_data(const Case& one, const All& all) {
     });
     const bool is_stuck = most(all, [](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
     if (!stuck && !(is_stuck && level == 0xFF)) continue;
-    const bool no_transceiver = one.seen.data_driven == false;
-    const std::vector<std::string> values{fmt::format("{}", all.size()), level == 0 ? "0" : "1"};
-    if (no_transceiver) return finding(FindingKind::transceiver_missing, values);
-    return explained(finding(FindingKind::miso_stuck, values), all);
+    const Finding found = stuck_at(one, all.size(), level != 0, FindingKind::miso_stuck);
+    return found.finding_kind == FindingKind::miso_stuck ? explained(found, all) : found;
   }
   return {};
 }
@@ -299,6 +304,22 @@ Finding some_damage(const Case& one, const All& all) {
 }
 
 }  // namespace
+
+bool all_at_rest(const std::vector<Attempted>& readings) {
+  return !readings.empty() && std::ranges::all_of(readings, [](const Attempted& one) {
+    const std::size_t bits = std::min(one.exchange.reply.bits, 8 * one.raw.size());
+    const BitView view(one.raw, bits);
+    for (std::size_t i = 0; i < bits; ++i) {
+      if (!view[i]) return false;
+    }
+    return bits != 0;
+  });
+}
+
+void judge_rest(const Case& one, std::vector<Finding>& findings) {
+  if (!host_clocks(one.unit.link) || one.good == 0 || !all_at_rest(one.seen.readings)) return;
+  findings.push_back(stuck_at(one, one.seen.readings.size(), true, FindingKind::data_at_rest));
+}
 
 Finding some_silence(const Observations& seen, std::size_t silent, std::size_t all) {
   return finding(FindingKind::sometimes_silent,

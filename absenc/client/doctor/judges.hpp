@@ -30,9 +30,14 @@ struct Case {
          (some * 1000 < readings || (some < 2 && readings >= many) || (stood_still && some * 100 < readings));
 }
 
+/// Returns whether every bit of every reading was 1, as on a data line at rest; false without readings.
+[[nodiscard]] bool all_at_rest(const std::vector<Attempted>& readings);
+
 void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
+/// Adds a finding if good replies consist of nothing but the level of a data line at rest.
+void judge_rest(const Case& one, std::vector<Finding>& findings);
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
 /// Returns a finding if the encoder began to reply only during the readings; otherwise nothing.

@@ -29,6 +29,7 @@ class ScriptedPort final : public Port<Item> {
 
   Time now() override { return now_; }
   void begin(const Step<Item>& step) override {
+    if (step.kind == Step<Item>::Kind::configure) return;  // it has no time
     now_ = std::max(now_, step.at);
     if (step.kind != Step<Item>::Kind::transfer) return;
     quiet_since_ = now_;

@@ -86,6 +86,12 @@ constexpr auto table = std::to_array<Words>({
      "broken wire",
      "check the transceiver's supply, the wire from its output RO to ADBUS2 and its enable inputs "
      "(docs/clock-cable.md)"},
+    {FindingKind::data_at_rest, "data_at_rest", warning,
+     "in {0} transfers every bit from the encoder was {1}, as on a line at rest",
+     "no encoder drives the data line, the clock does not reach it, or the shaft rests at its last position: the "
+     "replies "
+     "have no checksum that tells",
+     "turn the shaft and run doctor again; if every bit stays the same, check supply and the pairs of clock and data"},
     {FindingKind::clock_range, "clock_range", note, "readings were good with clocks of {0} to {1} Hz{2}", "{3}", "{4}"},
     {FindingKind::wrong_echo, "wrong_echo", fault, "{4} with {0}, but {2} of {3} with {1}",
      "the adapter's echo is not as given", "set {1}"},
