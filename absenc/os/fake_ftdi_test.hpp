@@ -29,7 +29,7 @@ class FakeFtdi final : public FtdiUsb {
   std::vector<FtdiAdapter> adapters() override { return plugged; }
   std::unique_ptr<FtdiChannel> open(const FtdiAdapter& adapter, char channel) override {
     opened = adapter.words() + '/' + channel;
-    mpsse.reset();
+    mpsse.reset(os::now());
     return std::make_unique<Channel>(*this);
   }
 

@@ -15,7 +15,8 @@ constexpr bool is_shift(std::uint8_t code) { return code < 0x80; }
 
 }  // namespace
 
-void Mpsse::reset() {
+void Mpsse::reset(Time now) {
+  pass_until(now);
   commands_.clear();
   replies_.clear();
   set(0xFF, 0);
@@ -32,10 +33,7 @@ void Mpsse::purge(bool commands, bool replies) {
 }
 
 void Mpsse::take(Bytes commands, Time now) {
-  if (now > this->now()) {
-    base_time_ = now;
-    since_ns_ = 0;
-  }
+  pass_until(now);
   commands_.insert(commands_.end(), commands.begin(), commands.end());
   std::size_t at = 0;
   while (at < commands_.size()) {

@@ -31,8 +31,8 @@ class Mpsse {
 
   explicit Mpsse(Wires& wires, std::uint32_t base = 60'000'000) : wires_(&wires), fast_(base) {}
 
-  /// Switches the engine off and on: all pins are inputs, all settings as after reset, nothing waits.
-  void reset();
+  /// Switches the engine off and on: all pins are inputs, all settings as after reset, nothing waits. Not before `now`.
+  void reset(Time now);
   /// Drops incomplete commands if `commands`, and replies that were not taken if `replies`.
   void purge(bool commands, bool replies);
   /// Executes `commands` from the host, of which a command may continue in the next call; not before `now`.
@@ -69,6 +69,11 @@ class Mpsse {
   [[nodiscard]] double half_ns() const { return (divisor_ + 1.0) * 1e9 / (by_five_ ? 12e6 : fast_); }
   [[nodiscard]] Time now() const { return base_time_ + Time(static_cast<Time::rep>(since_ns_)); }
   void pass(double ns) { since_ns_ += ns; }
+  void pass_until(Time time) {
+    if (time <= now()) return;
+    base_time_ = time;
+    since_ns_ = 0;
+  }
 
   struct Reply {
     std::uint8_t byte;

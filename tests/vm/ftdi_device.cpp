@@ -118,7 +118,7 @@ class Chip {
         return;
       }
       if (event.type == FUNCTIONFS_ENABLE || event.type == FUNCTIONFS_DISABLE) {
-        with([](ftdi::Mpsse& mpsse) { mpsse.reset(); });
+        with([](ftdi::Mpsse& mpsse) { mpsse.reset(os::now()); });
         is_mpsse_ = false;
       }
       if (event.type == FUNCTIONFS_SETUP) answer(event.u.setup);
@@ -145,7 +145,7 @@ class Chip {
         break;
       case set_mode:  // 2: MPSSE; all others are not simulated
         is_mpsse_ = request.wValue >> 8 == 2;
-        mpsse_.reset();
+        mpsse_.reset(os::now());
         break;
       case pins:
         reply = {mpsse_.levels()};

@@ -17,6 +17,7 @@ GADGET = "/sys/kernel/config/usb_gadget/ftdi"
 FOLDER = "/tmp/ftdi"
 SERIAL = "FT1ABC"
 NODE = "/dev/bus/usb"
+UNITS = ("ssi", "biss", "biss-safety", "biss-chain", "endat")
 
 
 def write(path, text):
@@ -99,6 +100,23 @@ class Ftdi(EncoderCase):
         self.addCleanup(chip.end)
         return chip
 
+    @contextlib.contextmanager
+    def plugged(self, what):
+        """A chip that is there until the end of the block, for one of several subtests."""
+        chip = Chip(what)
+        try:
+            yield chip
+        finally:
+            chip.end()
+
+    def findings(self, unit, *more):
+        """Returns the findings of doctor by their ids."""
+        result = absenc("doctor", f"{unit}:ftdi", "--readings", "20", "--json", *more)
+        found = {one["id"]: one for one in json.loads(result.stdout)["findings"]}
+        is_ill = any(one["severity"] != "note" for one in found.values())
+        self.assertEqual(result.returncode, 1 if is_ill else 0, result.stdout)
+        return found
+
     def run_json(self, *arguments):
         result = absenc(*arguments, "--json")
         self.assert_good(result)
@@ -117,18 +135,14 @@ class Reading(Ftdi):
         self.assertEqual(chip.counts()["misused"], 0)
 
     def test_every_clocked_unit(self):
-        for unit in ("ssi", "biss", "biss-safety", "biss-chain"):
-            with self.subTest(unit=unit):
-                chip = Chip(f"{unit}?singleturn=2748&motion=still")
-                try:
-                    self.assertEqual(self.run_json("read", f"{unit}:ftdi:{SERIAL}")["singleturn"], 2748)
-                    self.assertEqual(self.run_json("read", f"{unit}:ftdi:{SERIAL}/A", "--count", "1")["ok"], True)
-                    result = absenc("doctor", f"{unit}:ftdi", "--readings", "20", "--json")
-                    self.assert_good(result)
-                    self.assertEqual([one["id"] for one in json.loads(result.stdout)["findings"]], ["clock_range"])
-                    self.assertEqual(chip.counts()["misused"], 0)
-                finally:
-                    chip.end()
+        for unit in UNITS:
+            with self.subTest(unit=unit), self.plugged(f"{unit}?singleturn=2748&motion=still") as chip:
+                self.assertEqual(self.run_json("read", f"{unit}:ftdi:{SERIAL}")["singleturn"], 2748)
+                self.assertEqual(self.run_json("read", f"{unit}:ftdi:{SERIAL}/A", "--count", "1")["ok"], True)
+                found = self.findings(unit)
+                self.assertEqual(list(found), ["clock_range"])
+                self.assertEqual(found["clock_range"]["action"], "keep the clock")
+                self.assertEqual(chip.counts()["misused"], 0)
 
     def test_turning(self):
         self.chip("biss?motion=rpm=60")
@@ -149,6 +163,33 @@ class Reading(Ftdi):
         self.assert_good(result)
         self.assertIn("a5", result.stdout)
 
+    def test_information_and_memory(self):
+        """Reads and writes registers of BiSS (control frames), and information and memory of EnDat."""
+        biss = {"serial_number": 1, "device_id": b"Absenc".hex()}
+        for unit, known, page, address, old, new in (
+                ("biss-safety", biss, 0, 5, "00", "0xA5"),
+                ("biss-chain", biss, 0, 5, "00", "0xA5"),
+                ("endat", {"kind": "rotary, single-turn", "serial_number": "412045230141"}, 169, 2, "0000", "0xABCD")):
+            with self.subTest(unit=unit), self.plugged(f"{unit}?singleturn=2748&motion=still") as chip:
+                info = self.run_json("info", f"{unit}:ftdi")
+                self.assertEqual(info["clock_hz"], 1000000)
+                fields = info["answers"]["info"]["fields"]
+                self.assertEqual({name: fields[name] for name in known}, known)
+                place = (f"{unit}:ftdi", str(address), "--page", str(page))
+                self.assertEqual(self.run_json("memory", "read", *place)["data"], old)
+                write = absenc("memory", "write", *place[:2], new, *place[2:], "--yes")
+                self.assert_good(write)
+                self.assertIn("written and read back", write.stdout + write.stderr)
+                self.assertEqual(self.run_json("memory", "read", *place)["data"], new[2:].lower())
+                self.assertEqual(self.run_json("read", f"{unit}:ftdi")["singleturn"], 2748)
+                self.assertEqual(chip.counts()["misused"], 0)
+
+    def test_values_that_endat_alone_has(self):
+        self.chip("endat?singleturn=2748&condition=temperature=55")
+        self.assertAlmostEqual(self.run_json("temperature", "endat:ftdi")["fields"]["temperature_c"], 55, delta=0.1)
+        self.assertEqual(self.run_json("read", "endat:ftdi?clock_khz=2000")["singleturn"], 2748)
+        self.assert_failed(absenc("read", "endat:ftdi?clock_khz=2001"), "reads a line that turns at up to 2000000 Hz")
+
     def test_identify(self):
         self.chip("biss?motion=rpm=60")
         found = self.run_json("identify", "ftdi")["candidates"][0]
@@ -157,14 +198,13 @@ class Reading(Ftdi):
 
     def test_identify_every_clocked_unit(self):
         """The shaft turns. SSI has no checksum: it is one of several candidates, and no conclusion."""
-        for unit in ("ssi", "biss-safety", "biss-chain"):
-            with self.subTest(unit=unit):
-                chip = Chip(f"{unit}?motion=rpm=60")
-                try:
-                    result = json.loads(absenc("identify", "ftdi", "--json").stdout)
-                    self.assertIn(unit, [one["protocol"] for one in result["candidates"]])
-                finally:
-                    chip.end()
+        for unit in ("ssi", "biss-safety", "biss-chain", "endat"):
+            with self.subTest(unit=unit), self.plugged(f"{unit}?motion=rpm=60"):
+                result = json.loads(absenc("identify", "ftdi", "--for", "300", "--json").stdout)
+                self.assertIn(unit, [one["protocol"] for one in result["candidates"]])
+                if unit == "endat":
+                    first = result["candidates"][0]
+                    self.assertEqual((first["protocol"], first["identity"].get("serial_number")), (unit, "412045230141"))
 
     def test_a_reading_is_one_transfer(self):
         chip = self.chip("biss")
@@ -241,35 +281,60 @@ class Unplugged(Ftdi):
 
 
 class Faults(Ftdi):
-    def doctor(self, *more):
-        result = absenc("doctor", "biss:ftdi", "--readings", "20", "--json", *more)
-        return {one["id"]: one for one in json.loads(result.stdout)["findings"]}
+    STUCK = {"miso_stuck", "transceiver_missing", "data_at_rest"}
 
-    def test_faults_on_the_line(self):
-        chip = self.chip("biss?singleturn=12345")
-        for order, words in (("stuck 0", "miso_stuck"), ("stuck 1", "miso_stuck"), ("no-clock", "miso_stuck"),
-                             ("no-transceiver", "transceiver_missing")):
-            with self.subTest(order=order):
-                chip.order(order)
-                self.assertEqual(absenc("read", "biss:ftdi").returncode, 1)
-                self.assertIn(words, self.doctor())
+    def test_stuck_lines_and_a_missing_transceiver(self):
+        """Each fault gives its finding and none of the others. A word of ones is a position of SSI."""
+        for unit in UNITS:
+            with self.plugged(f"{unit}?singleturn=12&motion=still") as chip:
+                for order, id_, id_of_ssi in (("stuck 0", "miso_stuck", "miso_stuck"),
+                                              ("stuck 1", "miso_stuck", "data_at_rest"),
+                                              ("no-clock", "miso_stuck", "data_at_rest"),
+                                              ("no-transceiver", "transceiver_missing", "transceiver_missing")):
+                    with self.subTest(unit=unit, order=order):
+                        chip.order(order)
+                        is_read = absenc("read", f"{unit}:ftdi").returncode == 0
+                        self.assertEqual(is_read, unit == "ssi" and order != "stuck 0")
+                        self.assertEqual(list(self.findings(unit)), [id_of_ssi if unit == "ssi" else id_])
                 chip.order("good")
-        chip.order("flip 40")
-        self.assertTrue(self.doctor().keys() & {"damaged_bits", "sometimes_damaged", "always_damaged", "damaged_bursts"})
-        chip.order("good")
-        self.assertEqual(self.run_json("read", "biss:ftdi")["singleturn"], 12345)
+                self.assertEqual(self.run_json("read", f"{unit}:ftdi")["singleturn"], 12)
+
+    def test_wrong_bits(self):
+        """SSI has no checksum: only positions that a shaft cannot reach show them, here at 10 rpm, because this machine is
+        late by milliseconds."""
+        damage = {"damaged_bits", "sometimes_damaged", "always_damaged", "damaged_bursts"}
+        for unit in UNITS:
+            with self.subTest(unit=unit), self.plugged(f"{unit}?singleturn=12&motion=still") as chip:
+                chip.order("flip 41")
+                found = self.findings(unit, "--option", "max_rpm=10")
+                self.assertTrue(found.keys() & ({"position_jumps"} if unit == "ssi" else damage), found)
+                chip.order("good")
+                self.assertEqual(self.run_json("read", f"{unit}:ftdi")["singleturn"], 12)
 
     def test_clock_sweep_measures_the_way(self):
         """SSI has no start bit, so a way longer than half a period shifts its bits."""
         chip = self.chip("ssi?singleturn=2748&min_clock_khz=10&max_clock_khz=2000")
         chip.order("delay 700")  # half a period at 714 kHz
-        result = absenc("doctor", "ssi:ftdi?speed=400000", "--readings", "20", "--json")
-        self.assert_good(result)
-        found = {one["id"]: one for one in json.loads(result.stdout)["findings"]}["clock_range"]
+        found = self.findings("ssi", "--option", "speed=400000")["clock_range"]
         # At 50 kHz the encoder's monoflop ends the word before the next clock.
         self.assertIn("good with clocks of 100000 to 600000 Hz, but only 0 of 5 at 50000 Hz and 0 of 5 at 800000 Hz",
                       found["evidence"])
         self.assertIn("takes 625 to 833 ns", found["cause"])
+
+    def test_clock_sweep_on_a_line_that_turns(self):
+        chip = self.chip("endat?model=ECN-1325&singleturn=2748")
+        chip.order("delay 700")  # a period at 1429 kHz
+        found = self.findings("endat", "--option", "model=ECN-1325")["clock_range"]
+        self.assertIn("to 1000000 Hz, but only 0 of 5 at 1500000 Hz", found["evidence"])
+        self.assertIn("takes 666 to 1000 ns", found["cause"])
+
+    def test_clock_sweep_behind_a_start_bit(self):
+        """A way of any length only shifts the bits of BiSS by whole clocks."""
+        chip = self.chip("biss?singleturn=2748")
+        chip.order("delay 700")
+        found = self.findings("biss")
+        self.assertEqual(list(found), ["clock_range"])
+        self.assertEqual(found["clock_range"]["action"], "keep the clock")
 
 
 class OtherPrograms(Ftdi):

@@ -42,7 +42,10 @@ struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, TimeoutSe
   std::uint8_t slaves = 2;
   std::int64_t unit_pm = 0;
 
-  [[nodiscard]] constexpr std::array<Channel, most> all() const { return {ChannelSettings<channel>::channel()...}; }
+  // Sets the channels that are used: making a word takes time, and a search makes one for each set of options.
+  constexpr void set_channels() {
+    ((channel < slaves ? static_cast<void>(channels[channel] = ChannelSettings<channel>::channel()) : void()), ...);
+  }
 };
 using EveryChannel = std::make_index_sequence<most>;
 using ChainSettings = ChainSettingsOf<EveryChannel>;
@@ -156,7 +159,7 @@ constexpr ChainFormat chain_format(const Options& values) {
   ChainSettings given = chain_options.format(values);
   given.count = given.slaves;
   given.timeout = given.timeout_given();
-  given.channels = given.all();
+  given.set_channels();
   if (values.has_word()) {
     for (Channel& channel : given.channels) channel.word = values.word;
     given.scale = {.linear = given.unit_pm != 0, .unit_um = static_cast<double>(given.unit_pm) / 1e6};
