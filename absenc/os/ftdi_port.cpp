@@ -48,6 +48,7 @@ FtdiPort::FtdiPort(const std::string& place, LinkKind kind, const LineSettings& 
 void FtdiPort::synchronise() {
   commands_.clear();
   commands_.unknown();
+  commands_.send_immediate();
   channel_->write(commands_.bytes());
   const Time limit = os::now() + 1s;
   std::array<std::uint8_t, 2> last{};

@@ -46,7 +46,7 @@ struct FtdiChannel {
   virtual ~FtdiChannel() = default;
   /// Sends all of `commands`. Throws Failure.
   virtual void write(Bytes commands) = 0;
-  /// Reads replies into `into` and returns their number; 0 if the chip has none for about a millisecond. Throws
+  /// Reads replies into `into` and returns their number; 0 if the chip has none for some milliseconds. Throws
   /// Failure.
   [[nodiscard]] virtual std::size_t read(MutableBytes into) = 0;
 };

@@ -14,9 +14,9 @@ using Kind = Failure::Kind;
 
 namespace {
 
-// The chip holds back received bytes until this time has passed, if it is not told to send them at once; in
-// milliseconds.
-constexpr unsigned char latency_ms = 1;
+// In milliseconds. After this time without a packet the chip sends one without replies, which a reading would have to
+// fetch before its own. Replies do not wait for it, because the chip is told to send them at once (0x87).
+constexpr unsigned char latency_ms = 16;
 
 constexpr int usb_timeout_ms = 3000;
 
