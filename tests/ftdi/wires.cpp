@@ -35,7 +35,7 @@ void EncoderWires::change(Time at, std::uint8_t levels, std::uint8_t outputs) {
   const bool out = (levels & Mpsse::out) != 0;
   if (std::exchange(out_, out) != out && records_) recorded_out_.push_back({at, out});
   // A pin that is no output is pulled up.
-  const bool high = (outputs & Mpsse::clock) == 0 || (levels & Mpsse::clock) != 0;
+  const bool high = ((outputs & Mpsse::clock) == 0 || (levels & Mpsse::clock) != 0) != fault.clock_swapped;
   if (clock_ == high) return;
   pass(at);  // a rest of the clock up to this edge may have ended the transfer
   clock_ = high;

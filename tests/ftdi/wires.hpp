@@ -32,6 +32,7 @@ class EncoderWires final : public Wires {
     std::optional<bool> stuck{};   // the data line stays at this level
     bool no_transceiver = false;   // nothing drives the data pin
     bool no_clock = false;         // the clock does not reach the encoder
+    bool clock_swapped = false;    // the wires of the clock pair are exchanged
     std::uint32_t flip_every = 0;  // every so manieth sampled bit is wrong; 0: none
   };
   Fault fault;

@@ -3,7 +3,7 @@
 // with a virtual encoder on its pins. Usage: ftdi_device FOLDER WHAT [VCD]. FOLDER: where FunctionFS is mounted; WHAT:
 // "PROTOCOL?settings" as behind sim:, "flash" or "nothing". VCD: a file for the waveform. Prints "ready", then takes
 // lines from standard input and answers each with "done": "delay NS", "stuck 0|1", "no-transceiver", "no-clock",
-// "flip N", "good", "counts" (prints counters first).
+// "swap-clock", "flip N", "good", "counts" (prints counters first).
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
 #include <unistd.h>
@@ -265,6 +265,7 @@ int run(const std::string& folder, const std::string& what, const char* vcd) {
       if (order == "stuck") encoder->fault.stuck = number != 0;
       if (order == "no-transceiver") encoder->fault.no_transceiver = true;
       if (order == "no-clock") encoder->fault.no_clock = true;
+      if (order == "swap-clock") encoder->fault.clock_swapped = true;
       if (order == "flip") encoder->fault.flip_every = static_cast<std::uint32_t>(number);
     });
     std::puts("done");

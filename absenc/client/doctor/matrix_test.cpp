@@ -167,7 +167,8 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   // On a clocked or SPI line the host receives bits even without a reply.
   static const Ids clocked = [] {
     Ids all = damage;
-    all.insert({"miso_stuck", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
+    all.insert(
+        {"miso_stuck", "data_at_rest", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
     return all;
   }();
   if (host_clocks(unit.link)) return clocked;

@@ -260,6 +260,7 @@ constexpr auto elsewhere = std::to_array<Elsewhere>({
     {FindingKind::port_forbidden, PortKind::ftdi, "no udev rule lets users open the chip",
      "install the rule of the package absenc (docs/clock-cable.md), and plug the chip in again"},
     {FindingKind::port_lost, PortKind::ftdi, "", "check the USB cable"},
+    {FindingKind::wrong_spi_mode, PortKind::ftdi, "the two wires of the clock pair are exchanged", ""},
     {FindingKind::reply_late, PortKind::ftdi, "this computer or its USB is busy", "reduce the load of the computer"},
     {FindingKind::sometimes_late, PortKind::ftdi, "this computer or its USB is busy",
      "reduce the load of the computer"},
