@@ -408,4 +408,4 @@ class Speed(Ftdi):
         chip.counts()
         result = absenc("bench", "biss:ftdi?ma_khz=5000", "--seconds", "10", "--json")
         self.assert_good(result)
-        print(f"# {result.stdout.strip()} {chip.counts()}", flush=True)
+        print(f"figures: {result.stdout.strip()} {chip.counts()}", flush=True)

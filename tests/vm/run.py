@@ -49,10 +49,10 @@ def boot(kernel, initramfs, folder):
 
 
 def judge(output, trouble):
-    """Prints the failed tests. Returns how many tests passed and how many failed."""
+    """Prints the failed tests, and measured figures. Returns how many tests passed and how many failed."""
     good = re.findall(r"^ok (.*)$", output, re.MULTILINE)
     bad = re.findall(r"^not ok .*\n(?:#.*\n)*", output, re.MULTILINE)
-    for report in bad:
+    for report in bad + re.findall(r"^figures: .*\n", output, re.MULTILINE):
         print(report, end="")
     end = re.search(r"^end of (\d+) tests$", output, re.MULTILINE)
     failed = len(bad)
