@@ -226,9 +226,9 @@ _absenc absenc
 """
 
 
-def run(*command, **settings):
+def run(*command, timeout=100, **settings):
     done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                          timeout=100, **settings)
+                          timeout=timeout, **settings)
     if done.returncode != 0:
         raise AssertionError(f"{shlex.join(map(str, command))}\n{done.stdout}\n{done.stderr}")
     return done.stdout
@@ -535,7 +535,7 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="absenc-package-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cpack", "--config", BUILD / "CPackConfig.cmake", "-B", cls.folder, umask=0o077)
+        run("cpack", "--config", BUILD / "CPackConfig.cmake", "-B", cls.folder, umask=0o077, timeout=400)
         cls.packages = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
         for name, package in cls.packages.items():
             run("dpkg-deb", "-x", package, cls.folder / name)

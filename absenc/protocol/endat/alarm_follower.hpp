@@ -13,10 +13,10 @@
 namespace absenc::endat {
 
 /// Composes four exchanges of a capture: a position, the selection of the operating status, its words 0 and 1.
-class AlarmFollower final : public Follower {
+class AlarmWordsFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.
-  explicit AlarmFollower(const Format& format) : format_(format) {}
+  explicit AlarmWordsFollower(const Format& format) : format_(format) {}
 
   void follow(std::uint64_t number, Bytes request, Bytes reply) override {
     is_complete_ = false;

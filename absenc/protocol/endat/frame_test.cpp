@@ -115,7 +115,7 @@ struct FollowerBench {
     return std::pair(*request, *reply);
   }
   Format format = rotary;
-  AlarmFollower follower{format};
+  AlarmWordsFollower follower{format};
   std::uint64_t number = 7;
   std::uint64_t first = 0;
 };

@@ -176,7 +176,7 @@ constexpr std::array<std::string_view, 2> recovery_names{"long", "short"};
 constexpr std::array<std::string_view, 2> shift_names{"subtracted", "added"};
 
 // The values of the options: those of the format, but the unit of length as a whole number.
-struct Given : Format {
+struct GivenFormat : Format {
   std::int64_t unit_pm = 0;
 };
 
@@ -185,7 +185,7 @@ constexpr auto options = OptionsOf{
         "singleturn_bits", "bits of the position within the turn; 0: asked from the encoder (decode: 25)", 0, 40),
     option<&Format::multiturn_bits>("multiturn_bits", "bits of the turns; 0: none, or asked", 0, 16),
     option<&Format::position_bits>("position_bits", "linear encoders: bits of the position", 0, 40),
-    decimal<6>(option<&Given::unit_pm>("unit_um", "linear encoders: um per count", 0, 1'000'000'000)),
+    decimal<6>(option<&GivenFormat::unit_pm>("unit_um", "linear encoders: um per count", 0, 1'000'000'000)),
     option<&Format::version>("version", "of EnDat, whose commands are used", version_names),
     with_role<Role::rate>(option<&Format::clock_khz>("clock_khz", "rate of the clock, kHz", 100, 16'000)),
     decimal<3>(
@@ -200,7 +200,7 @@ constexpr auto options = OptionsOf{
 };
 
 constexpr Format format_by(const Options& values) {
-  const Given given = options.format(values);
+  const GivenFormat given = options.format(values);
   Format format = given;
   format.unit_um = static_cast<double>(given.unit_pm) / 1e6;
   return format;
@@ -246,8 +246,8 @@ Options learned(const Options& values, const Reading& reading) {
 }
 
 Follower* make_follower(const Options& values, std::span<std::byte> storage) {
-  if (storage.size() < sizeof(AlarmFollower)) return nullptr;
-  return new (storage.data()) AlarmFollower(format_by(values));
+  if (storage.size() < sizeof(AlarmWordsFollower)) return nullptr;
+  return new (storage.data()) AlarmWordsFollower(format_by(values));
 }
 
 BitRanges host_bits(const Options& values, Frame burst) { return host_ranges(format_by(values), to_bits(burst)); }
@@ -289,7 +289,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .host_bits = host_bits,
     .learned = learned,
     .follower = make_follower,
-    .follower_storage = sizeof(AlarmFollower),
+    .follower_storage = sizeof(AlarmWordsFollower),
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
