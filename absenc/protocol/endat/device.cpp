@@ -12,6 +12,7 @@ constexpr author::DirectionRules directions{rules::collision, rules::early_suppl
 
 constexpr std::uint32_t signal_periods = 2048;  // of a turn
 constexpr std::int64_t counts_of_linear_period = 16;
+constexpr std::uint32_t other_warning = 1u << 7;  // a bit of the word of the warnings to which no source gives a name
 constexpr std::uint16_t supported_errors = alarm::errors;
 constexpr std::uint16_t supported_warnings = alarm::warnings >> alarm::warnings_shift;
 
@@ -103,7 +104,9 @@ void VirtualEncoder::write_parameters() {
 
 std::uint16_t VirtualEncoder::errors() const { return static_cast<std::uint16_t>(latched_ & alarm::errors); }
 std::uint16_t VirtualEncoder::warnings() const {
-  return static_cast<std::uint16_t>((latched_ & alarm::warnings) >> alarm::warnings_shift);
+  // WRN alone stands for a warning that no source names.
+  const std::uint32_t other = (latched_ & alarm::warning) != 0 ? other_warning : 0;
+  return static_cast<std::uint16_t>((latched_ & alarm::warnings) >> alarm::warnings_shift | other);
 }
 
 std::int64_t VirtualEncoder::counts_of_period() const {

@@ -48,6 +48,11 @@ TEST(EndatProcedures, StatusNamesErrorsAndWarnings) {
   EXPECT_EQ(status.numbers.at("alarms"), std::int64_t{0x0202 | alarm::error | alarm::warning});
   EXPECT_EQ(bench.run("clear-alarms").error, Error::none);
   EXPECT_EQ(bench.run("status").numbers.at("alarms"), 0);
+  // A warning without a name is only the group bit.
+  bench.device.raise_alarms(alarm::warning);
+  EXPECT_EQ(bench.run("status").numbers.at("alarms"), std::int64_t{alarm::warning});
+  EXPECT_EQ(bench.run("clear-alarms").error, Error::none);
+  EXPECT_EQ(bench.run("status").numbers.at("alarms"), 0);
   EXPECT_EQ(bench.violations(), 0u) << bench.first_violation();
 }
 
