@@ -3,12 +3,17 @@
 #include <ftdi.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include "absenc/os/error.hpp"
 #include "absenc/os/ftdi.hpp"
 #include "absenc/os/linux/usb_device.hpp"
 #include "absenc/os/serial_ports.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::os {
+
+using namespace std::chrono_literals;
 
 using Kind = Failure::Kind;
 
@@ -19,6 +24,8 @@ namespace {
 constexpr unsigned char latency_ms = 16;
 
 constexpr int usb_timeout_ms = 3000;
+
+constexpr Time file_removal = 300ms;  // longest time between the failure of a transfer and the removal of the file
 
 Failure ftdi_in_use(const FtdiAdapter& adapter) {
   const std::string holder = holder_of(adapter.device);
@@ -84,7 +91,10 @@ class Channel final : public FtdiChannel {
 
   void check(bool good, const char* what) const {
     if (good) return;
-    if (::access(adapter_.device.c_str(), F_OK) != 0) throw lost(adapter_);
+    // The kernel removes the file of an unplugged chip some time after the transfer has failed.
+    for (const Time limit = os::now() + file_removal; os::now() < limit; os::sleep_until(os::now() + 10ms)) {
+      if (::access(adapter_.device.c_str(), F_OK) != 0) throw lost(adapter_);
+    }
     throw Failure(Kind::lost, "USB failed to " + std::string(what) + " the " + adapter_.words() + " (" +
                                   ::ftdi_get_error_string(context_) + "): unplug it and plug it in");
   }
