@@ -104,6 +104,19 @@ TEST(EndatEncoder, NamesBothWhenHostDrivesIntoTheReply) {
   EXPECT_EQ(broken_by({{.kind = Kind::transfer, .out = command, .bits = 20, .out_bits = 8}}), rules::few_clocks);
 }
 
+TEST(EndatEncoder, RefusesAreasAndWordsThatItDoesNotHave) {
+  Bench bench(rotary);
+  const auto error_of = [&bench](const Request& request) { return ask(bench, rotary, request).error(); };
+  EXPECT_EQ(error_of({.code = ModeCommand::select, .byte = 0xBB}), Error::request_rejected);
+  EXPECT_EQ(error_of({.code = ModeCommand::read, .byte = 0x0D}), Error::request_rejected) << "no area is selected";
+  EXPECT_EQ(error_of({.code = ModeCommand::select, .byte = area::maker_1}), Error::none);
+  EXPECT_EQ(error_of({.code = ModeCommand::read, .byte = 0x0D}), Error::none);
+  EXPECT_EQ(error_of({.code = ModeCommand::read, .byte = 0x03}), Error::request_rejected);
+  EXPECT_EQ(error_of({.code = ModeCommand::write, .byte = 0x0D, .word = 1}), Error::request_rejected)
+      << "the maker's words cannot be written";
+  EXPECT_EQ(ask(bench, rotary, {.code = ModeCommand::read, .byte = 0x0D})->word, 0x8019);
+}
+
 TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
   const auto broken_at = [](std::uint32_t rate, CommandSet version) {
     Format format = rotary;

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
 #include <string>
 
 #include "absenc/protocol/author/unit_bench_test.hpp"
@@ -35,6 +38,22 @@ TEST(EndatProcedures, AskForTheResolution) {
   ASSERT_EQ(read.error, Error::none) << read.detail;
   EXPECT_EQ(read.reading->singleturn_bits, 32u);
   EXPECT_DOUBLE_EQ(read.reading->unit_um, 0.05);
+}
+
+TEST(EndatProcedures, RefusesAResolutionThatContradictsItself) {
+  // Words in the encoder's memory: each takes two bytes, area A1 begins with word 4 and area A3 follows it.
+  constexpr std::size_t count_at = 2 * (0x0D - 4);
+  constexpr std::size_t steps_at = 2 * (12 + 4);
+  const auto asked_with = [](std::size_t at, std::initializer_list<std::uint8_t> bytes) {
+    Bench bench("singleturn_bits=25");
+    std::copy(bytes.begin(), bytes.end(), bench.device.memory().begin() + static_cast<std::ptrdiff_t>(at));
+    bench.options = author::testing::options_of(endat::unit, "singleturn_bits=0");
+    return bench.run("position");
+  };
+  EXPECT_TRUE(asked_with(steps_at, {3, 0, 0, 0}).says("no power of two"));
+  EXPECT_EQ(asked_with(steps_at, {3, 0, 0, 0}).error, Error::unsupported);
+  EXPECT_EQ(asked_with(count_at, {60, 0x80}).error, Error::unsupported);
+  EXPECT_EQ(asked_with(steps_at, {0, 0, 0, 1}).error, Error::cross_check_failed) << "24 bits of 25";
 }
 
 TEST(EndatProcedures, StatusNamesErrorsAndWarnings) {
