@@ -10,6 +10,6 @@ foreach(source IN LISTS bench_sources)
   absenc_settings(bench_${name})
   set_target_properties(bench_${name} PROPERTIES OUTPUT_NAME ${name}
                         RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/bench")
-  target_link_libraries(bench_${name} PRIVATE absenc::absenc absenc::os absenc::capture benchmark::benchmark)
+  target_link_libraries(bench_${name} PRIVATE absenc::absenc absenc::os absenc::capture ${libzip_LIBRARIES} benchmark::benchmark)
   add_dependencies(benchmarks bench_${name})
 endforeach()

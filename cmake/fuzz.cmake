@@ -3,7 +3,6 @@
 if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "ABSENC_FUZZ needs clang: cmake --preset sanitize")
 endif()
-pkg_check_modules(libzip REQUIRED libzip)  # sigrok_fuzz writes its archives with libzip
 add_custom_target(fuzzers)
 
 file(GLOB_RECURSE fuzz_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/absenc/*_fuzz.cpp"

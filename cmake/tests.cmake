@@ -5,7 +5,6 @@
 find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
 find_package(PkgConfig REQUIRED)
-pkg_check_modules(libzip REQUIRED libzip)
 include(GoogleTest)
 
 # Tests with the label `long`: `./dev test` skips them, `./dev test --all` runs them.
