@@ -8,7 +8,14 @@ set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -f
 
 # Folders whose sources belong to libraries of their own, because they need libraries of the system.
 set(absenc_separate_folders absenc/os/linux/cuse absenc/os/linux/without_cuse absenc/os/linux/ftdi
-    absenc/os/linux/gpio)
+    absenc/os/linux/gpio absenc/capture/files/without_zip tools/absenc/monitor/without_screen)
+
+# Folders of absenc/os for other systems than that of the target, as a regular expression.
+if(CMAKE_SYSTEM_NAME STREQUAL "Windows")
+  set(absenc_other_systems linux)
+else()
+  set(absenc_other_systems windows)
+endif()
 
 # Sets `result` to the given sources and those in the given folders, without tests, fuzzers and benchmarks. The sources
 # in a folder of absenc_separate_folders are included only if exactly that folder is given.
@@ -22,11 +29,17 @@ function(absenc_sources result)
     list(APPEND found ${sources})
   endforeach()
   list(FILTER found EXCLUDE REGEX "_(test|fuzz|bench)\\.cpp$")
+  list(FILTER found EXCLUDE REGEX "/absenc/os/(${absenc_other_systems})/")
   foreach(folder IN LISTS absenc_separate_folders)
     if(NOT folder IN_LIST ARGN)
       list(FILTER found EXCLUDE REGEX "/${folder}/")
+    elseif(folder MATCHES "^(.+)/without_[a-z0-9]+$")  # its sources are in place of those above it
+      file(GLOB replaced RELATIVE "${absenc_root}/${folder}" "${absenc_root}/${folder}/*.cpp")
+      list(TRANSFORM replaced PREPEND "${absenc_root}/${CMAKE_MATCH_1}/")
+      list(REMOVE_ITEM found ${replaced})
     endif()
   endforeach()
+  list(REMOVE_DUPLICATES found)
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()
 

@@ -2,10 +2,13 @@
 # Unit tests: one executable per layer and per protocol folder. Cross-cutting tests: one executable per file of tests/.
 # A build with only some units (ABSENC_UNITS) has only the tests of these units and those that test every unit, because
 # all other tests name units.
-find_package(GTest REQUIRED)
-find_package(rapidcheck REQUIRED)
-find_package(PkgConfig REQUIRED)
-include(GoogleTest)
+if(NOT WIN32)  # cmake/windows.cmake builds GoogleTest
+  find_package(GTest REQUIRED)
+  find_package(rapidcheck REQUIRED)
+  find_package(PkgConfig REQUIRED)
+  set(absenc_test_libraries ${libzip_LIBRARIES} rapidcheck)
+  include(GoogleTest)
+endif()
 
 # Tests with the label `long`: `./dev test` skips them, `./dev test --all` runs them.
 set(absenc_long_python_tests
@@ -37,14 +40,15 @@ endforeach()
 function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
-  target_compile_options(${target} PRIVATE -O0)
+  # g++ 12 for mingw wrongly sees memory of coroutines that was not allocated being freed
+  target_compile_options(${target} PRIVATE -O0 $<$<BOOL:${WIN32}>:-Wno-free-nonheap-object>)
   # A fuzzer needs coverage instrumentation in the code that it runs, but not in the tests, where the instrumentation
   # takes a quarter of the compile time.
   if(ABSENC_FUZZ)
     target_compile_options(${target} PRIVATE -fsanitize-coverage=0)
   endif()
-  target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture ${libzip_LIBRARIES} rapidcheck GTest::gtest_main
-                                          GTest::gmock)
+  target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture ${absenc_test_libraries}
+                                          GTest::gtest_main GTest::gmock)
 endfunction()
 
 # Only modes_test.cpp gets the path of the sources as a macro: for a file with such a macro the compiler cache is
@@ -52,6 +56,9 @@ endfunction()
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
+if(WIN32)
+  set(CMAKE_CROSSCOMPILING_EMULATOR /usr/lib/wine/wine64)
+endif()
 add_library(test_headers OBJECT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
 absenc_test_settings(test_headers)
 target_precompile_headers(test_headers PRIVATE <gtest/gtest.h>)
@@ -77,6 +84,11 @@ function(absenc_test name)
   endif()
   # the folder of the sources, for tests that compare tables in documents with the code
   set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
+  if(WIN32)  # one start of wine for each program, because its start takes longer than most tests
+    add_test(NAME ${name} COMMAND ${name}_test --gtest_brief=1)
+    set_tests_properties(${name} PROPERTIES ENVIRONMENT "${environment}")
+    return()
+  endif()
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
   set(long "${absenc_long_${name}_tests}")
   if(long)
@@ -99,11 +111,30 @@ function(absenc_keep_tests_for_every_unit list_of_sources)
   set(${list_of_sources} "${kept}" PARENT_SCOPE)
 endfunction()
 
+# Removes from a list of sources those that a build for Windows leaves out: tests with libraries that have no package for
+# it, and tests of another system or with functions of POSIX.
+function(absenc_keep_tests_for_windows list_of_sources)
+  set(kept)
+  foreach(source IN LISTS ${list_of_sources})
+    file(STRINGS "${source}" needs LIMIT_COUNT 1 REGEX
+         "include [<\"](rapidcheck|zip\\.h|hdf5|unistd\\.h|fcntl\\.h|sys/|pthread\\.h|tests/ftdi|absenc/capture/files/(test_files|zip_archive)|absenc/client/hdf5|absenc/os/(linux|fake_ftdi))|mkdtemp\\(|setenv\\(|write_sigrok")
+    if(NOT needs AND NOT source MATCHES "/absenc/os/linux/")
+      list(APPEND kept "${source}")
+    endif()
+  endforeach()
+  set(${list_of_sources} "${kept}" PARENT_SCOPE)
+endfunction()
+
 # With ABSENC_SPLIT_TESTS each source becomes an executable, because tests/mutants.py runs only some of them.
 function(absenc_folder_test name folder glob)
   file(${glob} sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*_test.cpp")
   if(ABSENC_UNITS AND NOT folder MATCHES "^absenc/protocol/")
     absenc_keep_tests_for_every_unit(sources)
+  endif()
+  if(WIN32)
+    absenc_keep_tests_for_windows(sources)
+  else()
+    list(FILTER sources EXCLUDE REGEX "/absenc/os/windows/")
   endif()
   if(ABSENC_SPLIT_TESTS AND folder MATCHES "^absenc/(host|protocol)")
     foreach(source IN LISTS sources)
@@ -123,8 +154,10 @@ if(ABSENC_LIBRARY_TESTS)
     foreach(layer IN ITEMS core link host sim capture os)
       absenc_folder_test(${layer} absenc/${layer} GLOB_RECURSE)
     endforeach()
-    target_sources(os_test PRIVATE tests/ftdi/mpsse.cpp tests/ftdi/wires.cpp)
-    target_link_libraries(os_test PRIVATE absenc::gpio)
+    if(NOT WIN32)
+      target_sources(os_test PRIVATE tests/ftdi/mpsse.cpp tests/ftdi/wires.cpp)
+      target_link_libraries(os_test PRIVATE absenc::gpio)
+    endif()
     absenc_folder_test(protocol absenc/protocol GLOB)
     absenc_all_protocols(tested_units)
     list(APPEND tested_units author)
@@ -136,6 +169,9 @@ if(ABSENC_LIBRARY_TESTS)
   if(ABSENC_UNITS)
     absenc_keep_tests_for_every_unit(cross_tests)
   endif()
+  if(WIN32)
+    absenc_keep_tests_for_windows(cross_tests)
+  endif()
   foreach(source IN LISTS cross_tests)
     cmake_path(GET source STEM stem)
     string(REGEX REPLACE "_test$" "" name "${stem}")
@@ -146,8 +182,8 @@ if(TARGET absenc-client)
   absenc_folder_test(client absenc/client GLOB_RECURSE)
   target_sources(client_test PRIVATE tests/kit/frames.cpp)
   target_link_libraries(client_test PRIVATE absenc::client absenc::configuration absenc::captures absenc::recording
-                                            absenc::hdf5 ${absenc_hdf5_libraries} ${absenc_fmt})
-  if(NOT ABSENC_UNITS)  # this test is an executable of its own, because it replaces malloc
+                                            $<TARGET_NAME_IF_EXISTS:absenc-hdf5> ${absenc_hdf5_libraries} ${absenc_fmt})
+  if(NOT ABSENC_UNITS AND NOT WIN32)  # this test is an executable of its own, because it replaces malloc of glibc
     absenc_test(reading_allocations tests/reading_allocations.cpp)
     target_link_libraries(reading_allocations_test PRIVATE absenc::client)
     # does not count allocations with sanitizers and fuzzers, because these replace malloc themselves
@@ -157,7 +193,7 @@ if(TARGET absenc-client)
   endif()
 endif()
 # Writes waveforms for ftdi_wave_test.py.
-if(TARGET absenc-client AND NOT ABSENC_UNITS)
+if(TARGET absenc-client AND NOT ABSENC_UNITS AND NOT WIN32)
   add_executable(ftdi_wave tests/ftdi_wave.cpp tests/ftdi/mpsse.cpp tests/ftdi/wires.cpp)
   absenc_settings(ftdi_wave)
   target_link_libraries(ftdi_wave PRIVATE absenc::client)
@@ -183,7 +219,7 @@ list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
 set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
 # Builds the fuzz functions as ordinary tests; not in fuzzer builds, where the fuzzers run them.
-if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
+if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ AND NOT WIN32)
   add_library(fuzz_seeds_main OBJECT tests/fuzz_seeds_main.cpp)
   absenc_settings(fuzz_seeds_main)
   target_link_libraries(fuzz_seeds_main PUBLIC absenc::absenc)
@@ -211,11 +247,11 @@ if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
 endif()
 
 # Tests in Python, which test the command and the sources.
-if(ABSENC_COMMAND AND NOT ABSENC_UNITS)
+if(ABSENC_COMMAND AND NOT ABSENC_UNITS AND NOT WIN32)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   file(GLOB python_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.py")
-  # firmware_test needs the ARM build, so only ./dev test --all runs it
-  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")
+  # firmware_test needs the ARM build, so only ./dev test --all runs it; windows_test needs ./dev windows
+  list(FILTER python_tests EXCLUDE REGEX "/(firmware|windows)_test\\.py$")
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
@@ -247,6 +283,9 @@ endif()
 file(GLOB examples CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/examples/*.cpp")
 if(NOT TARGET absenc-client OR ABSENC_UNITS)
   set(examples)
+endif()
+if(WIN32)  # this example reads its own virtual encoder through a pseudo-terminal
+  list(FILTER examples EXCLUDE REGEX "/virtual_encoder\\.cpp$")
 endif()
 foreach(source IN LISTS examples)
   cmake_path(GET source STEM name)

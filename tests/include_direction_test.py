@@ -39,7 +39,11 @@ LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
     r"^(sys|linux|asm|asm-generic|net|netinet|arpa|fuse3)/|"
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal|dlfcn|ifaddrs|"
-    r"windows|winsock2|ws2tcpip)\.h(pp)?$"
+    r"windows|winsock2|ws2tcpip|io|shellapi|setupapi|devguid)\.h(pp)?$"
+)
+# A condition that asks on which system the code is compiled. Only files in absenc/os may ask.
+ASKS_FOR_SYSTEM = re.compile(
+    r"^\s*#\s*(?:if|ifdef|ifndef|elif)\b.*\b(_WIN32|_WIN64|__MINGW32__|__MINGW64__|__linux__|__unix__)\b", re.MULTILINE
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 # The patterns rely on clang-format, which puts types at namespace scope at the beginning of a line.
@@ -159,6 +163,9 @@ def faults(root):
     for top in ("absenc", "tools", "tests", "bench", "examples"):
         for file in sorted((root / top).rglob("*.[ch]pp")):
             path = file.relative_to(root)
+            asks = ASKS_FOR_SYSTEM.search(file.read_text(encoding="utf-8"))
+            if asks and path.parts[0] in ("absenc", "tools") and path.parts[:2] != ("absenc", "os"):
+                found.append(f"{path}: {asks[1]}: only files in absenc/os may ask for the system")
             for bracket, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
                 fault = layer_fault(root, path, Path(name)) if bracket == '"' else system_fault(path, name)
                 if bracket == "<" and name.startswith("absenc/"):
@@ -208,6 +215,7 @@ class SelfTest(unittest.TestCase):
         "absenc/client/tap/run.hpp": '#include "absenc/client/captures/run.hpp"\n',
         "absenc/serve/http.hpp": '#include "absenc/client/text/rows.hpp"\n',
         "absenc/serve/http.cpp": "#include <microhttpd.h>\n",
+        "absenc/os/windows/serial.cpp": "#ifdef _WIN32\n#include <windows.h>\n#endif\n",
         "absenc/os/linux/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/os/linux/sys_file.hpp"\n',
         "tools/absenc/main.cpp": '#include <CLI/CLI.hpp>\n#include "absenc/protocol/all.hpp"\n',
         "tools/absenc/text.hpp": "#include <string>\n",
@@ -228,6 +236,10 @@ class SelfTest(unittest.TestCase):
         for path, line in (
             ("absenc/core/bits.hpp", '#include "absenc/link/step.hpp"'),
             ("absenc/core/bits.hpp", "#include <string>"),
+            ("absenc/client/row.hpp", "#ifdef _WIN32"),
+            ("tools/absenc/text.hpp", "#if defined(__linux__) && 1"),
+            ("absenc/os/linux/serial.cpp", '#include "absenc/os/windows/handle.hpp"'),
+            ("absenc/os/serial.hpp", "#include <windows.h>"),
             ("absenc/core/bits.hpp", "  #  include <vector>"),
             ("absenc/core/bits.hpp", "#include <absenc/core/bits.hpp>"),
             ("absenc/core/bits.hpp", '#include "bits.hpp"'),

@@ -65,11 +65,13 @@ SHARED = {
     "Snapshot": "what is known of a watched encoder at a moment",
     "State": "where the state machine around it stands",
     "Statistics": "sums over what the class around it has seen",
+    "Terminal": "the terminal of a screen",
     "Type": "the type that a template finds",
     "Values": "the values of a protocol's fields",
     "VirtualEncoder": "the virtual encoder of the protocol",
     "Watch": "a thread that reads one encoder, and what is known of that encoder",
     "Watches": "the watches of several encoders",
+    "fuse_session": "a name that libfuse prescribes",
     "promise_type": "a name that C++ prescribes",
     "value_type": "a name that C++ prescribes",
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line of a virtual encoder: a pseudo-terminal, and optionally a TCP port.
+// The line of a virtual encoder: a pseudo-terminal, and optionally a TCP port. On Windows only TCP.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ class EmulatorPort final : public StreamPort {
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
-  /// Returns the path for other programs to open: the link if there is one, else the terminal.
+  /// Returns the path for other programs to open: the link if there is one, else the terminal; "" without a terminal.
   [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_.path : link_; }
   /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }

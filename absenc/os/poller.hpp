@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waits for bytes on a few descriptors, for a deadline, and for SIGINT or SIGTERM.
+// Waits for bytes on a few descriptors, for a deadline, and for Ctrl-C.
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 
 #include "absenc/core/time.hpp"
-#include "absenc/os/descriptor.hpp"
 
 namespace absenc::os {
 
@@ -16,8 +15,11 @@ class Poller {
   // Greatest number of descriptors that one call of `wait` returns.
   static constexpr std::size_t most_ready = 16;
 
-  /// Creates the epoll and timer descriptors. Throws Failure.
+  /// Throws Failure if the system has no room for what it needs.
   Poller();
+  ~Poller();
+  Poller(const Poller&) = delete;
+  Poller& operator=(const Poller&) = delete;
 
   /// Makes `wait` report `descriptor` when it is readable or has an error. Throws Failure.
   void add(int descriptor);
@@ -29,13 +31,8 @@ class Poller {
   [[nodiscard]] std::span<const int> wait(Time deadline);
 
  private:
-  void arm(Time deadline);
-
-  Descriptor epoll_;
-  Descriptor timer_;
-  Time armed_ = never;   // time at which `timer_` expires; `never` if it is not set
-  int interrupts_ = -1;  // descriptor that is readable after SIGINT or SIGTERM; -1 while these signals are not caught
-  std::array<int, most_ready> ready_{};
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace absenc::os

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/core/time.hpp"
 #include "absenc/os/descriptor.hpp"
@@ -12,13 +13,21 @@
 namespace absenc::os {
 
 /// Protects this process from the state of its standard streams: writing to a closed pipe, or to a file at its size
-/// limit, fails instead of ending the process, and closed streams are opened on /dev/null. Throws Failure.
+/// limit, fails instead of ending the process, and closed streams are opened on /dev/null. Windows: line feeds stay as
+/// they are. Throws Failure.
 void protect_standard_streams();
 
 /// Writes `bytes` to standard output. Returns 0 or a value of errno.
 [[nodiscard]] int write_standard_output(std::string_view bytes);
 
+/// Writes `bytes` to standard error, and ignores errors.
+void write_standard_error(std::string_view bytes);
+
+/// Returns whether the descriptor of a standard stream, 0 to 2, is a terminal.
 [[nodiscard]] bool is_terminal(int descriptor);
+
+/// Returns the words of the command line in UTF-8, from the parameters of `main`.
+[[nodiscard]] std::vector<std::string> command_words(int count, char** words);
 
 /// Returns the processor time (user and system) that this process has used so far.
 [[nodiscard]] Time processor_time();

@@ -2,6 +2,7 @@
 // Wires on which a host sends pulses, in addition to the data wires: RTS, DTR or a GPIO line.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -26,12 +27,15 @@ struct PulseWires {
   PulseWire clear{};
 };
 
+/// An output of a UART beside its data.
+enum class ModemLine : std::uint8_t { rts, dtr };
+
 /// The system calls of a PulseOutput, which tests override. A call that fails sets errno. Here only modem lines work;
 /// os/gpio adds the GPIO lines, so that programs without them need no libgpiod.
 struct WireKernel {
   virtual ~WireKernel() = default;
-  /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
-  virtual int set_modem_lines(int descriptor, unsigned long request, int lines);
+  /// Sets or clears a modem line of the serial port with this descriptor. The pin of a UART is low while it is set.
+  virtual int set_modem_line(int descriptor, ModemLine line, bool set);
   virtual gpiod_line* find_gpio(const std::string& name);
   /// Requests `line` as an output at logical level 0 (inactive).
   virtual int request_gpio(gpiod_line* line, bool active_low);

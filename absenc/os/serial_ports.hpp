@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Information from /sys and /proc about serial ports.
+// Serial ports as the system lists them; Linux: in /sys and /proc.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/os/error.hpp"
@@ -13,8 +14,21 @@
 
 namespace absenc::os {
 
-/// Returns the paths of all terminals with hardware behind them, "/dev/ttyUSB0" and so on, sorted.
+/// Returns the paths of all serial ports with hardware behind them, "/dev/ttyUSB0" or "COM3" and so on, sorted. `sys`
+/// is a parameter for tests on Linux here and below; other systems ignore it.
 [[nodiscard]] std::vector<std::string> serial_ports(const std::filesystem::path& sys = "/sys/class/tty");
+
+/// Returns whether `place` is written as only serial ports are: with a '/' on Linux, "COM5" on Windows.
+[[nodiscard]] bool is_written_as_port(std::string_view place);
+
+/// Returns the port that a user means by `name`: "/dev/ttyUSB0" for "ttyUSB0", "COM5" for "com5"; "" if it is none.
+[[nodiscard]] std::string port_named(std::string_view name);
+
+/// Returns a name that serial ports have here, for examples: "/dev/ttyUSB0" and "COM3" for `which` 0.
+[[nodiscard]] std::string example_port(unsigned which = 0);
+
+/// Returns how to shorten the latency timer of `terminal` to 1 ms, in words.
+[[nodiscard]] std::string way_to_shorter_latency(const std::string& terminal);
 
 /// Returns for how many milliseconds a USB adapter holds back received bytes; empty if unknown.
 [[nodiscard]] std::optional<unsigned> latency_timer(const std::string& terminal,

@@ -104,6 +104,8 @@ class DescriptorPort : public StreamPort {
 
   /// Writes as many bytes as possible, like write(2).
   virtual std::ptrdiff_t write_some(Bytes bytes);
+  /// Reads what is there, like read(2).
+  std::ptrdiff_t read_once(MutableBytes into);
 
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;

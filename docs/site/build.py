@@ -21,7 +21,7 @@ PAGES = ["README.md", "CONTRIBUTING.md", "docs/*.md", "absenc/protocol/*/README.
 # reports a page that no list names as an error.
 CONTENTS = {
     "Use": ["docs/read", "docs/set-up", "docs/record", "docs/serve", "docs/mqtt", "docs/tap", "docs/decode", "docs/doctor",
-            "docs/test-a-drive", "docs/clock-cable", "man/absenc.1"],
+            "docs/test-a-drive", "docs/clock-cable", "docs/windows", "man/absenc.1"],
     "Program": ["docs/cpp", "cpp-reference", "docs/python", "python-reference", "docs/firmware", "docs/drive"],
     "Encoders": ["docs/encoders", "absenc/protocol/*/README", "docs/add-an-encoder", "docs/write-a-unit", "docs/line-faults", "docs/dump-format"],
     "Project": ["docs/architecture", "docs/benchmarks", "docs/stability", "CONTRIBUTING", "tests/abuse/README"],

@@ -96,7 +96,7 @@ std::string help() {
   text += "Exit status:";
   for (std::size_t i = 0; i < exit_statuses.size(); ++i)
     text += fmt::format("{} {} {}", i == 0 ? "" : ",", i, exit_statuses[i]);
-  return text + ".\n";
+  return with_ports_of_this_system(text + ".\n");
 }
 
 }  // namespace absenc::tool

@@ -13,6 +13,7 @@
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/text/field_text.hpp"
@@ -146,7 +147,7 @@ void write_report(const std::string& path, const BugReport& report) {
 
 bool is_report(const std::string& path) {
   try {
-    const std::unique_ptr<capture::Source> source = capture::file_source(path);
+    const std::unique_ptr<capture::Source> source = capture::file_source(os::path_of(path));
     capture::ZipArchive::Entry entry;
     return capture::ZipArchive(*source).find(about_file, entry);
   } catch (const capture::OpenError&) {
@@ -155,7 +156,7 @@ bool is_report(const std::string& path) {
 }
 
 int show_report(const std::string& path) {
-  const std::unique_ptr<capture::Source> source = capture::file_source(path);
+  const std::unique_ptr<capture::Source> source = capture::file_source(os::path_of(path));
   capture::ZipArchive archive(*source);
   const std::string summary = read_part(archive, path, about_file);
   if (!summary.starts_with(fmt::format("{}\n", report_title))) {

@@ -4,12 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
-#include <iostream>
+#include <cstdint>
 #include <string>
 
 #include "absenc/os/error.hpp"
-#include "absenc/os/signals.hpp"
+#include "absenc/os/input.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/text/output.hpp"
 
@@ -26,16 +27,15 @@ bool is_yes(std::string_view answer) {
 
 bool says_yes(const std::string& question) {
   print_prompt(question);
-  os::Watched input{.descriptor = 0};
+  std::array<std::uint8_t, 256> line;  // a terminal hands out whole lines
   try {
-    os::wait_for({&input, 1}, never);
+    const std::size_t size = os::read_standard_input(line, never).value_or(0);
+    std::string_view answer(reinterpret_cast<const char*>(line.data()), size);
+    return is_yes(answer.substr(0, answer.find('\n')));
   } catch (const os::Interrupted&) {
     print_note("");
     throw;
   }
-  std::string answer;
-  std::getline(std::cin, answer);
-  return is_yes(answer);
 }
 
 bool disturbs(const EncoderAddress& uri, const Command& command) {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "absenc/os/serial_ports.hpp"
+
 namespace absenc::tool {
 
 namespace {
@@ -47,6 +49,18 @@ std::string parameter_lines(std::span<const Parameter> parameters, bool options)
 
 }  // namespace
 
+std::string with_ports_of_this_system(std::string_view written) {
+  std::string text(written);
+  for (const unsigned which : {0u, 1u}) {
+    const std::string port = fmt::format("/dev/ttyUSB{}", which);
+    const std::string here = os::example_port(which);
+    for (std::size_t at = text.find(port); at != std::string::npos; at = text.find(port, at + here.size())) {
+      text.replace(at, port.size(), here);
+    }
+  }
+  return text;
+}
+
 std::string example_lines(std::span<const Example> examples) {
   std::string text;
   for (const Example& example : examples) text += fmt::format("  {}\n      {}\n", example.command, example.meaning);
@@ -84,7 +98,7 @@ std::string help(const Subcommand& subcommand) {
   if (!arguments.empty()) text += fmt::format("\nArguments:\n{}", arguments);
   text +=
       fmt::format("\nOptions:\n{}{:<24}{}\n", parameter_lines(subcommand.parameters, true), "  --help", "this text");
-  return text + fmt::format("\nExamples:\n{}", example_lines(subcommand.examples));
+  return with_ports_of_this_system(text + fmt::format("\nExamples:\n{}", example_lines(subcommand.examples)));
 }
 
 }  // namespace absenc::tool

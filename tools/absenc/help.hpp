@@ -56,6 +56,9 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 /// Returns the help text of all verbs of two words that begin with `first_word_of_two`, such as "memory".
 [[nodiscard]] std::string help(std::string_view first_word_of_two);
 
+/// Returns a text of the tables with the names that serial ports have here, in place of those of Linux.
+[[nodiscard]] std::string with_ports_of_this_system(std::string_view written);
+
 /// Returns the examples as help lists them, one below the other.
 [[nodiscard]] std::string example_lines(std::span<const Example> examples);
 

@@ -14,6 +14,7 @@
 #include "absenc/client/configuration.hpp"  // the command reads absenc.toml
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/process.hpp"
 #include "tools/absenc/command_line.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
@@ -154,8 +155,10 @@ int run_command_line(std::span<char*> words, std::string& understood) {
 int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
   std::string understood;
-  std::vector<char*> words(arguments, arguments + argument_count);
-  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows that argc is 0
+  std::vector<std::string> all = absenc::os::command_words(argument_count, arguments);
+  std::vector<char*> words;
+  for (std::string& word : all) words.push_back(word.data());
+  words.erase(words.begin(), words.begin() + std::min<std::ptrdiff_t>(std::ssize(words), 1));  // POSIX: argc may be 0
   std::string help_option = "--help", version_option = "--version";
   // `absenc help read` prints the same as `absenc read --help`.
   if (!words.empty() && std::string_view(words.front()) == "help") {

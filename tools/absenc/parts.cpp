@@ -16,6 +16,11 @@ namespace absenc::tool {
 namespace {
 
 [[noreturn]] void report_missing(std::string_view purpose, std::string_view path, std::string_view package) {
+#ifdef ABSENC_PARTS_LEFT_OUT
+  throw Failure(
+      fmt::format("{} is not in this build of absenc, nor is the package {}: {} says what was left out and why",
+                  purpose, package, ABSENC_PARTS_LEFT_OUT));
+#endif
   throw Failure(fmt::format("{} is a part of absenc that is not installed: {} is not there. Install the package {}",
                             purpose, path, package));
 }

@@ -68,7 +68,7 @@ std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder, const O
   std::vector<std::pair<unsigned, std::filesystem::path>> files;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::string stem = entry.path().stem().string();
+    const std::string stem = name_of(entry.path().stem());
     constexpr std::string_view prefix = "digital_";
     unsigned number = 0;
     if (!stem.starts_with(prefix) || entry.path().extension() != ".bin") continue;
@@ -77,15 +77,15 @@ std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder, const O
     files.emplace_back(number, entry.path());
   }
   if (files.empty()) {
-    throw OpenError(folder.string() +
+    throw OpenError(name_of(folder) +
                     " is a folder without a binary export of Saleae Logic 2: there is no digital_0.bin");
   }
   std::sort(files.begin(), files.end());
   std::vector<SaleaeChannel> channels;
   for (const auto& [number, path] : files) {
-    channels.push_back({saleae_channel_name(path.stem().string()), file_source(path)});
+    channels.push_back({saleae_channel_name(name_of(path.stem())), file_source(path)});
   }
-  return checked(read_saleae(std::move(channels)), folder.string(), choices);
+  return checked(read_saleae(std::move(channels)), name_of(folder), choices);
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string
 std::unique_ptr<Reader> open_capture(const std::filesystem::path& path, const OpenChoices& choices) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return open_folder(path, choices);
-  return open_capture(file_source(path), path.string(), choices);
+  return open_capture(file_source(path), name_of(path), choices);
 }
 
 }  // namespace absenc::capture

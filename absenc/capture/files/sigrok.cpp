@@ -161,6 +161,11 @@ class SigrokReader final : public Reader {
 
   // Opens the session as a zip archive; a file that lost the directory at its end gets a new one.
   void open_archive(std::string_view name) {
+    if (!has_zip()) {
+      throw OpenError(std::string(name) +
+                      " is a zip archive, as the sessions of sigrok are, and this program was built without the "
+                      "libraries that read it: export VCD or CSV instead");
+    }
     std::unique_ptr<ZipArchive> archive = take_handle();
     if (archive == nullptr) {
       cut_ = mend_zip(std::move(source_));

@@ -92,14 +92,14 @@ class MemorySource final : public Source {
 std::unique_ptr<Source> file_source(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw OpenError(path.string() + " does not exist");
-  if (std::filesystem::is_directory(status)) throw OpenError(path.string() + " is a folder");
+  if (!std::filesystem::exists(status)) throw OpenError(name_of(path) + " does not exist");
+  if (std::filesystem::is_directory(status)) throw OpenError(name_of(path) + " is a folder");
   if (!std::filesystem::is_regular_file(status)) {
-    throw OpenError(path.string() + " is no file that can be read at any place: copy it into one");
+    throw OpenError(name_of(path) + " is no file that can be read at any place: copy it into one");
   }
   const std::uint64_t size = std::filesystem::file_size(path, error);
   Handle handle = error ? nullptr : open_handle(path);
-  if (handle == nullptr) throw OpenError(path.string() + " cannot be read: check its permissions");
+  if (handle == nullptr) throw OpenError(name_of(path) + " cannot be read: check its permissions");
   return std::make_unique<FileSource>(path, size, std::move(handle));
 }
 

@@ -25,6 +25,12 @@ struct Source {
   [[nodiscard]] virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) = 0;
 };
 
+/// Returns the name of `path` in UTF-8; on Windows the conversion of std::filesystem has another encoding.
+[[nodiscard]] inline std::string name_of(const std::filesystem::path& path) {
+  const std::u8string name = path.u8string();
+  return {name.begin(), name.end()};
+}
+
 /// Opens a regular file as a source of bytes. Throws OpenError.
 [[nodiscard]] std::unique_ptr<Source> file_source(const std::filesystem::path& path);
 

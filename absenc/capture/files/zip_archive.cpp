@@ -203,6 +203,8 @@ struct ZipArchive::State {
   }
 };
 
+bool has_zip() { return true; }
+
 ZipArchive::ZipArchive(Source& source) : state_(std::make_unique<State>()) {
   state_->source = &source;
   std::optional<std::vector<DirectoryEntry>> entries = read_directory(source);

@@ -13,6 +13,9 @@
 
 namespace absenc::capture {
 
+/// Returns whether this program can read and write archives: it was built with the libraries for them.
+[[nodiscard]] bool has_zip();
+
 class ZipArchive {
  public:
   /// Opens the archive in `source`, which must outlive this object. Throws OpenError.

@@ -139,7 +139,7 @@ struct Rows final : capture::AnnotationSink {
 class ClockedLines : public ::testing::Test {
  protected:
   Rows decode(const Wires& wires, std::string_view unit, const std::vector<std::string>& options = {}) {
-    const std::string path = directory_.path() / "wires.vcd";
+    const std::string path = (directory_.path() / "wires.vcd").string();
     wires.write(path);
     const Unit& found = require_unit(unit);
     CaptureRun run(found, require_options(found, "", options), {path, {}});

@@ -152,7 +152,7 @@ class LiveAndCaptured : public ::testing::TestWithParam<const Unit*> {
     }
     stage->run(together.commands);
     if (stage->live.empty()) return;
-    const std::string path = directory_.path() / "capture.vcd";
+    const std::string path = (directory_.path() / "capture.vcd").string();
     stage->write(path);
     const bool changes = together.commands[0]->changes_encoder;
     together.is_long = together.is_long || (changes && std::filesystem::file_size(path) > long_file);

@@ -22,6 +22,7 @@
 #include "absenc/client/captures/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/file_name.hpp"
 
 namespace absenc::client {
 
@@ -122,7 +123,7 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
                                  .samples_per_second = choices.how.samples_per_second};
   if (choices.received != nullptr) return std::make_unique<ReceivedReader>(choices.received);
   try {
-    if (choices.path != "-") return capture::open_capture(choices.path, how);
+    if (choices.path != "-") return capture::open_capture(os::path_of(choices.path), how);
     auto source = std::make_unique<StdinSource>();
     // Refuses binary captures on standard input: some binary formats are read from the end of the file, and standard
     // input has no known end.

@@ -18,6 +18,7 @@
 #include "absenc/client/text/text_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/sim_port.hpp"
@@ -38,8 +39,8 @@ Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * 
 
 enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };
 
-FileFormat format_of(const std::filesystem::path& path) {
-  const std::string ending = path.extension();
+FileFormat format_of(const std::string& name) {
+  const std::string ending = os::name_of(os::path_of(name).extension());
   if (ending == ".vcd") return FileFormat::vcd;
   if (ending == ".sr") return FileFormat::sigrok;
   if (ending == ".csv") return FileFormat::saleae;
@@ -47,7 +48,7 @@ FileFormat format_of(const std::filesystem::path& path) {
       fmt::format("what to write is told by the end of the name: \"{}\" must end in .vcd (every viewer), .sr (sigrok, "
                   "PulseView) or "
                   ".csv (as Saleae Logic 2 exports it)",
-                  path.string()));
+                  name));
 }
 
 /// A command with its arguments, parsed from one text.
@@ -139,8 +140,8 @@ void converse(Conversations& conversations) {
 
 // Makes a temporary file on the disk of the result, so that lack of space is found there.
 capture::ScratchFile scratch_file(const std::string& path) {
-  os::Descriptor file = os::nameless_file(std::filesystem::path(path).parent_path());
-  return capture::ScratchFile(::fdopen(file.release(), "w+"));
+  os::Descriptor file = os::nameless_file(os::name_of(os::path_of(path).parent_path()));
+  return capture::ScratchFile(::fdopen(file.release(), "w+b"));
 }
 
 void write_drawing(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing,
@@ -151,9 +152,9 @@ void write_drawing(const WaveChoices& choices, const std::string& path, capture:
     return capture::write_sigrok(path, drawing, choices.samples_per_second == 0 ? usual : choices.samples_per_second);
   }
   os::NewFile file(path);
-  std::ofstream out(file.path(), std::ios::binary);
+  std::ofstream out(os::path_of(file.path()), std::ios::binary);
   format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
-  out.flush();
+  out.close();  // on Windows no open file can be renamed
   if (!out) throw Failure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
   file.take_place(os::Durable::no);
 }
@@ -181,7 +182,7 @@ Waved draw_wave(std::string_view text, std::span<const std::string> settings, co
     throw UsageError(fmt::format("the sample rate must be 1 to {}", fastest));
   }
   if (choices.count == 0 || !(choices.rate > 0)) throw UsageError("results, and how many a second, are more than 0");
-  if (std::filesystem::exists(path) && !choices.replaces) {
+  if (std::filesystem::exists(os::path_of(path)) && !choices.replaces) {
     throw UsageError(
         fmt::format("{} exists: give another name, or --force (in Python replaces=True) to replace it", file));
   }

@@ -13,6 +13,7 @@
 #include "absenc/client/share.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/os/serial_ports.hpp"
 
 namespace absenc::client {
 
@@ -167,8 +168,9 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
         finding(kind_of(*seen.refusal), {seen.refusal->sentence, std::string(action_for(seen.refusal->holder))}));
   }
   if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
-    const std::string terminal = std::filesystem::path(seen.port).filename();
-    findings.push_back(finding(FindingKind::latency_timer, {terminal, fmt::format("{}", *timer)}));
+    const std::string terminal = std::filesystem::path(seen.port).filename().string();
+    findings.push_back(finding(FindingKind::latency_timer,
+                               {terminal, fmt::format("{}", *timer), os::way_to_shorter_latency(terminal)}));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/serial_ports.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -17,8 +18,8 @@ Medium medium_of(const LineSearch& search) {
   if (place.starts_with("spi:")) return Medium::spi;
   if (is_ftdi_place(place)) return Medium::ftdi;
   if (place.starts_with("tcp:")) return Medium::tcp;
-  // A place without '/' is no path, so it is the name of a CAN interface.
-  return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Medium::can : Medium::serial;
+  // A place that is not written as a serial port is the name of a CAN interface.
+  return place.starts_with("slcan:") || !os::is_written_as_port(place) ? Medium::can : Medium::serial;
 }
 
 bool fits(const Unit& unit, const LineSearch& search) {

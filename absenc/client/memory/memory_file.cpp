@@ -14,6 +14,7 @@
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/core/hex.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/file_name.hpp"
 
 namespace absenc::client {
 
@@ -56,7 +57,7 @@ void MemoryFile::load(MutableBytes memory) {
       return save(memory, os::Durable::yes);
     } catch (const Failure&) {
       std::error_code ignored;
-      std::filesystem::remove(path_, ignored);
+      std::filesystem::remove(os::path_of(path_), ignored);
       throw;
     }
   }

@@ -170,11 +170,11 @@ bool goes_over_serial(const Unit& unit) {
 }
 
 std::string examples(const Unit& unit) {
-  const auto first = [](const std::vector<std::string>& ports, const char* otherwise) {
-    return ports.empty() ? std::string(otherwise) : ports.front();
+  const auto first = [](const std::vector<std::string>& ports, const std::string& otherwise) {
+    return ports.empty() ? otherwise : ports.front();
   };
   if (goes_over_serial(unit)) {
-    return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit.id, first(os::serial_ports(), "/dev/ttyUSB0"));
+    return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit.id, first(os::serial_ports(), os::example_port()));
   }
   if (unit.link == LinkKind::can) {
     return fmt::format("{0}:{1}, {0}:slcan:/dev/ttyACM0 or sim:{0}", unit.id, first(os::can_interfaces(), "can0"));
@@ -258,7 +258,7 @@ void parse_where(EncoderAddress& uri, std::string_view address) {
     if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
   } else if (where.starts_with("slcan:")) {
     uri.port_kind = PortKind::slcan;
-  } else if (uri.unit->link == LinkKind::can && where.find('/') == std::string_view::npos) {
+  } else if (uri.unit->link == LinkKind::can && !os::is_written_as_port(where)) {
     uri.port_kind = PortKind::can;
   }
   check_place(uri, address);
@@ -367,17 +367,17 @@ const LinkParameter* find_link_parameter(std::string_view name) {
 std::optional<std::string> bare_port(std::string_view text) {
   const std::string_view address = text.substr(0, text.find('?'));
   const std::string_view first = address.substr(0, address.find(':'));
-  const bool is_place = first.find('/') != std::string_view::npos || first == "tcp" || first == "spi" ||
-                        first == "slcan" || is_ftdi_place(address);
+  const bool is_place =
+      os::is_written_as_port(first) || first == "tcp" || first == "spi" || first == "slcan" || is_ftdi_place(address);
   if (is_place) return std::string(text);
   if (!is_name(address)) return std::nullopt;
   const auto is_one_of = [](const std::vector<std::string>& ports, std::string_view name) {
     return std::find(ports.begin(), ports.end(), name) != ports.end();
   };
-  const bool is_serial = is_one_of(os::serial_ports(), fmt::format("/dev/{}", address));
-  const bool is_port = is_serial || is_one_of(os::can_interfaces(), address);
+  const std::string serial = os::port_named(address);
+  const bool is_port = !serial.empty() || is_one_of(os::can_interfaces(), address);
   if (!is_port || is_in_settings_file(address)) return std::nullopt;
-  return (is_serial ? "/dev/" : "") + std::string(text);
+  return (serial.empty() ? std::string(address) : serial) + std::string(text.substr(address.size()));
 }
 
 EncoderAddress parse_address(std::string_view text, std::span<const std::string> more) {

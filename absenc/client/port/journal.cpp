@@ -8,13 +8,14 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/append.hpp"
+#include "absenc/os/file_name.hpp"
+#include "absenc/os/user_folders.hpp"
 
 namespace absenc::client {
 
@@ -22,11 +23,6 @@ namespace {
 
 constexpr std::array fields{&JournalEntry::time,  &JournalEntry::encoder, &JournalEntry::what,    &JournalEntry::before,
                             &JournalEntry::after, &JournalEntry::result,  &JournalEntry::put_back};
-
-std::string of_environment(const char* name) {
-  const char* const value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
 
 std::string calendar_time() {
   const auto now = std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
@@ -49,15 +45,10 @@ std::string line_of(const JournalEntry& entry) {
 }  // namespace
 
 std::string journal_path() {
-  if (const std::string path = of_environment("ABSENC_CHANGES"); !path.empty()) return path == "none" ? "" : path;
-  constexpr std::string_view name = "changes.tsv";
-  if (const std::string folder = of_environment("STATE_DIRECTORY"); !folder.empty())
-    return fmt::format("{}/{}", folder, name);
-  // Ignores a relative path, as the XDG Base Directory Specification requires.
-  const std::string state = of_environment("XDG_STATE_HOME");
-  if (state.starts_with('/')) return fmt::format("{}/absenc/{}", state, name);
-  const std::string home = of_environment("HOME");
-  return home.empty() ? "" : fmt::format("{}/.local/state/absenc/{}", home, name);
+  if (std::string path = os::environment("ABSENC_CHANGES"); !path.empty()) return path == "none" ? "" : path;
+  std::string folder = os::environment("STATE_DIRECTORY");  // a service of systemd has one
+  if (folder.empty()) folder = os::state_folder();
+  return folder.empty() ? "" : os::name_of(os::path_of(folder) / "changes.tsv");
 }
 
 std::string append_to_journal(const std::string& path, JournalEntry entry) {
@@ -70,8 +61,8 @@ std::string append_to_journal(const std::string& path, JournalEntry entry) {
 Journal read_journal(const std::string& path) {
   Journal journal;
   std::error_code error;
-  if (path.empty() || !std::filesystem::exists(path, error)) return journal;
-  std::ifstream file(path);
+  if (path.empty() || !std::filesystem::exists(os::path_of(path), error)) return journal;
+  std::ifstream file(os::path_of(path), std::ios::binary);
   if (!file) throw Failure(fmt::format("the journal {} cannot be read: {}", path, std::strerror(errno)));
   for (std::string line; std::getline(file, line);) {
     JournalEntry entry;

@@ -5,11 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/text_file.hpp"
+#include "absenc/os/file_name.hpp"
+#include "absenc/os/user_folders.hpp"
 
 namespace absenc::client {
 
@@ -18,12 +19,6 @@ namespace {
 constexpr const char* variable = "ABSENC_CONFIG";
 
 SettingsParser parse = nullptr;
-
-// Returns the value of the environment variable; "" if it is not set.
-std::string environment(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
 
 }  // namespace
 
@@ -34,15 +29,11 @@ const FileSetting* FileSection::find(std::string_view setting) const {
 }
 
 std::vector<std::string> settings_file_paths() {
-  if (const std::string path = environment(variable); !path.empty()) return {path};
+  if (const std::string path = os::environment(variable); !path.empty()) return {path};
   std::vector<std::string> paths{"absenc.toml"};
-  // Ignores a relative path, as the XDG Base Directory Specification requires.
-  std::string folder = environment("XDG_CONFIG_HOME");
-  if (!folder.starts_with('/')) {
-    const std::string home = environment("HOME");
-    folder = home.empty() ? "" : home + "/.config";
+  if (const std::string folder = os::settings_folder(); !folder.empty()) {
+    paths.push_back(os::name_of(os::path_of(folder) / "absenc.toml"));
   }
-  if (!folder.empty()) paths.push_back(folder + "/absenc/absenc.toml");
   return paths;
 }
 
@@ -52,12 +43,12 @@ bool reads_settings_file() { return parse != nullptr; }
 
 std::optional<SettingsFile> load_settings_file() {
   if (parse == nullptr) return std::nullopt;
-  const bool must_exist = !environment(variable).empty();
+  const bool must_exist = !os::environment(variable).empty();
   for (const std::string& path : settings_file_paths()) {
     namespace fs = std::filesystem;
     std::error_code ignored;
-    if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
-      const fs::file_type type = fs::status(path, ignored).type();
+    if (fs::symlink_status(os::path_of(path), ignored).type() != fs::file_type::not_found) {
+      const fs::file_type type = fs::status(os::path_of(path), ignored).type();
       // the file type is `none` for a symbolic link that leads to itself
       if (type == fs::file_type::not_found || type == fs::file_type::none) {
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/file_name.hpp"
 
 namespace absenc::client {
 
@@ -18,7 +19,7 @@ Hdf5FileMaker make_hdf5_file = nullptr;
 void set_hdf5_file_maker(Hdf5FileMaker maker) { make_hdf5_file = maker; }
 
 RecordForm record_form(const std::string& path) {
-  const std::string ending = std::filesystem::path(path).extension();
+  const std::string ending = os::name_of(os::path_of(path).extension());
   if (ending == ".csv") return RecordForm::csv;
   if (ending == ".jsonl" || ending == ".ndjson") return RecordForm::json_lines;
   if (ending == ".h5" || ending == ".hdf5") return RecordForm::hdf5;

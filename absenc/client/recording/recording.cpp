@@ -19,6 +19,7 @@
 #include "absenc/client/recording/record_file.hpp"
 #include "absenc/client/sample_rows.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::client {
@@ -127,26 +128,26 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
 
 std::string Recording::Parts::part_path(unsigned part) const {
   if (!settings_.part_bytes && !settings_.part_time) return settings_.path;
-  const fs::path path(settings_.path);
-  const std::string name = fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
-  return path.parent_path() / name;
+  const fs::path path = os::path_of(settings_.path);
+  const std::string name = fmt::format("{}-{:04}{}", os::name_of(path.stem()), part, os::name_of(path.extension()));
+  return os::name_of(path.parent_path() / os::path_of(name));
 }
 
 // Throws if the folder has parts of an older recording with the same name: new parts count up, and might reach the
 // number of an old part.
 void Recording::Parts::refuse_parts_of_another_recording() const {
-  const fs::path path(settings_.path);
-  const std::string begin = path.stem().string() + "-";
-  const std::string ending = path.extension();
+  const fs::path path = os::path_of(settings_.path);
+  const std::string begin = os::name_of(path.stem()) + "-";
+  const std::string ending = os::name_of(path.extension());
   std::error_code error;  // ignored: an unreadable folder is reported when the file is created
   for (const fs::directory_entry& entry :
        fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
-    const std::string name = entry.path().filename();
+    const std::string name = os::name_of(entry.path().filename());
     if (!name.starts_with(begin) || !name.ends_with(ending) || name.size() < begin.size() + ending.size() + 4) continue;
     const std::string number = name.substr(begin.size(), name.size() - begin.size() - ending.size());
     if (!std::all_of(number.begin(), number.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) continue;
-    throw UsageError(
-        fmt::format("there is already a part of another recording, {}: choose another name", entry.path().string()));
+    throw UsageError(fmt::format("there is already a part of another recording, {}: choose another name",
+                                 os::name_of(entry.path())));
   }
 }
 

@@ -16,6 +16,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/socketcan.hpp"
@@ -99,8 +100,8 @@ TapRun::TapRun(std::string_view place, TapChoices choices) : choices_(std::move(
   open(lines_.front());
   if (choices_.record.empty()) return;
   std::error_code error;
-  if (choices_.replaces && std::filesystem::is_regular_file(choices_.record, error)) {
-    std::filesystem::remove(choices_.record, error);
+  if (choices_.replaces && std::filesystem::is_regular_file(os::path_of(choices_.record), error)) {
+    std::filesystem::remove(os::path_of(choices_.record), error);
   }
   record_ =
       std::make_unique<TapRecord>(choices_.record, fmt::format("received by absenc tap from {}", receiver_->place()));

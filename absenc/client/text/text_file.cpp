@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/process.hpp"
 
 namespace absenc::client {
@@ -28,8 +29,8 @@ std::string read_text_file(std::string_view what, const std::string& path) {
     throw Failure(fmt::format("{} {} cannot be read: {}", what, path, why));
   };
   std::error_code ignored;
-  if (fs::is_directory(path, ignored)) refuse("it is a directory");
-  std::ifstream file(path, std::ios::binary);
+  if (fs::is_directory(os::path_of(path), ignored)) refuse("it is a directory");
+  std::ifstream file(os::path_of(path), std::ios::binary);
   if (!file) refuse(std::strerror(errno));
   std::string text;
   for (std::array<char, 1 << 16> part; file; text.append(part.data(), static_cast<std::size_t>(file.gcount()))) {
@@ -42,22 +43,23 @@ std::string read_text_file(std::string_view what, const std::string& path) {
 
 std::string link_target(const std::string& path) {
   std::error_code ignored;
-  fs::path target = fs::absolute(path, ignored);
+  fs::path target = fs::absolute(os::path_of(path), ignored);
   for (int links = 0; links < 40 && fs::is_symlink(target, ignored); ++links) {
     target = target.parent_path() / fs::read_symlink(target, ignored);
   }
-  return target;
+  return os::name_of(target);
 }
 
 void require_replaceable(const std::string& path) {
   const auto refuse = [&](std::string_view why) { throw Failure(fmt::format("{} cannot be written: {}", path, why)); };
   std::error_code ignored;
-  const fs::path folder = fs::absolute(path, ignored).parent_path();
-  if (!fs::exists(path, ignored)) {
-    if (!fs::is_directory(folder, ignored)) refuse(fmt::format("there is no directory {}", folder.string()));
+  const fs::path file = os::path_of(path);
+  const fs::path folder = fs::absolute(file, ignored).parent_path();
+  if (!fs::exists(file, ignored)) {
+    if (!fs::is_directory(folder, ignored)) refuse(fmt::format("there is no directory {}", os::name_of(folder)));
     return;
   }
-  if (!fs::is_regular_file(path, ignored)) refuse("it is no regular file");
+  if (!fs::is_regular_file(file, ignored)) refuse("it is no regular file");
   if (const int error = os::replaceable(path); error != 0) refuse(std::strerror(error));
 }
 

@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/input.hpp"
 
+#include <poll.h>
 #include <unistd.h>
 
 #include <cerrno>
-
-#include "absenc/os/error.hpp"
-#include "absenc/os/signals.hpp"
+#include <csignal>
 
 namespace absenc::os {
 
-std::optional<std::size_t> read_standard_input(MutableBytes into, Time deadline) {
-  for (;;) {
-    Watched input{.descriptor = STDIN_FILENO};
-    if (!wait_for({&input, 1}, deadline)) return std::nullopt;
-    const ssize_t size = ::read(STDIN_FILENO, into.data(), into.size());
-    if (size >= 0) return static_cast<std::size_t>(size);
-    if (errno == EAGAIN || errno == EINTR) continue;
-    throw system_failure("reading standard input", errno);
-  }
+std::ptrdiff_t read_what_is_there(int descriptor, MutableBytes into) {
+  pollfd readable{descriptor, POLLIN, 0};
+  if (::poll(&readable, 1, 0) > 0) return ::read(descriptor, into.data(), into.size());
+  errno = EAGAIN;
+  return -1;
+}
+
+void allow_background(int descriptor) {
+  if (::isatty(descriptor) == 1) static_cast<void>(::signal(SIGTTIN, SIG_IGN));
 }
 
 }  // namespace absenc::os

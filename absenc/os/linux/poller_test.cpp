@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
 
+#include "absenc/os/descriptor.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 

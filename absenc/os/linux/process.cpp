@@ -51,6 +51,17 @@ int write_standard_output(std::string_view bytes) {
   return 0;
 }
 
+void write_standard_error(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(STDERR_FILENO, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+std::vector<std::string> command_words(int count, char** words) { return {words, words + count}; }
+
 bool is_terminal(int descriptor) { return ::isatty(descriptor) == 1; }
 
 Time processor_time() {

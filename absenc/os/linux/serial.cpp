@@ -190,8 +190,7 @@ void SerialPort::shorten_latency() {
     set_latency(latency() + std::chrono::milliseconds(*milliseconds));
     if (*milliseconds > 1) {
       notes_.push_back("the latency timer of " + terminal + " is " + std::to_string(*milliseconds) +
-                       " ms, which limits the readings a second: `echo 1 | sudo tee /sys/class/tty/" + terminal +
-                       "/device/latency_timer`");
+                       " ms, which limits the readings a second: " + way_to_shorter_latency(terminal));
     }
   }
 }

@@ -138,6 +138,20 @@ std::vector<std::string> serial_ports(const fs::path& sys) {
   return ports;
 }
 
+bool is_written_as_port(std::string_view place) { return place.find('/') != std::string_view::npos; }
+
+std::string port_named(std::string_view name) {
+  std::string path = "/dev/" + std::string(name);
+  const std::vector<std::string> all = serial_ports();
+  return std::find(all.begin(), all.end(), path) == all.end() ? std::string() : path;
+}
+
+std::string example_port(unsigned which) { return "/dev/ttyUSB" + std::to_string(which); }
+
+std::string way_to_shorter_latency(const std::string& terminal) {
+  return "`echo 1 | sudo tee /sys/class/tty/" + terminal + "/device/latency_timer`";
+}
+
 std::optional<unsigned> latency_timer(const std::string& terminal, const fs::path& sys) {
   return first_number(sys / terminal / "device" / "latency_timer");
 }

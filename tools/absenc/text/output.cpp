@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 
 #include "absenc/os/process.hpp"
@@ -20,15 +19,11 @@ void print_line(std::string_view text) {
   throw Failure(fmt::format("standard output cannot be written: {}", std::strerror(error)));
 }
 
-// Does not use fmt::print, which throws if standard error is closed: that must not change the exit status.
 void print_note(std::string_view text) { print_prompt(fmt::format("{}\n", text)); }
 
 void print_message(std::string_view text) { print_prompt(fmt::format("absenc: {}\n", text)); }
 
-void print_prompt(std::string_view text) {
-  std::fwrite(text.data(), 1, text.size(), stderr);
-  std::fflush(stderr);
-}
+void print_prompt(std::string_view text) { os::write_standard_error(text); }
 
 bool can_ask() { return os::is_terminal(0) && os::is_terminal(2); }
 

@@ -11,6 +11,7 @@
 #include "absenc/client/conform_host.hpp"
 #include "absenc/client/emulation/request_watch.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/spidev_node.hpp"
 #include "tools/absenc/consent.hpp"
@@ -31,7 +32,7 @@ std::string without_end(std::string text) {
 int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
-    std::ofstream file(path);
+    std::ofstream file(os::path_of(path), std::ios::binary);
     file << conformance.junit() << std::flush;
     if (!file)
       throw UsageError(fmt::format("{} cannot be written: choose a folder that is there and may be written", path));

@@ -10,6 +10,7 @@
 #include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "tools/absenc/bug_report.hpp"
 #include "tools/absenc/capture_choices.hpp"
 #include "tools/absenc/error.hpp"
@@ -166,10 +167,11 @@ int run_decode(const Invocation& invocation) {
   }
   const std::string_view first = invocation.text("protocol");
   std::error_code error;
-  if (!invocation.has("file") && std::filesystem::is_regular_file(first, error) && is_report(std::string(first))) {
+  if (!invocation.has("file") && std::filesystem::is_regular_file(os::path_of(first), error) &&
+      is_report(std::string(first))) {
     return show_report(std::string(first));
   }
-  if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(first, error)) {
+  if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(os::path_of(first), error)) {
     return identify_instead(first);
   }
   const Unit& unit = require_unit(first);

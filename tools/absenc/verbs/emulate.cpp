@@ -196,7 +196,7 @@ void note_count(Notes& notes, std::string_view what, std::uint64_t count) {
 }
 
 void print_ready(const os::EmulatorPort& port) {
-  print_line(fmt::format("ready: {}", port.path()));
+  if (!port.path().empty()) print_line(fmt::format("ready: {}", port.path()));
   if (port.tcp_port() != 0) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
 }
 

@@ -11,6 +11,7 @@
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/capture_choices.hpp"
@@ -143,12 +144,13 @@ int identify_capture(const Invocation& invocation) {
 // Returns whether `where` names a file, or a folder such as a logic analyser's export.
 bool is_capture(std::string_view where) {
   std::error_code error;
-  return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
+  const std::filesystem::path path = os::path_of(where);
+  return std::filesystem::is_regular_file(path, error) || std::filesystem::is_directory(path, error);
 }
 
 // Throws Failure if no such file exists and `where` looks like the name of a file, not of a port.
 void refuse_missing_file(std::string_view where) {
-  const std::filesystem::path path(where);
+  const std::filesystem::path path = os::path_of(where);
   std::error_code error;
   if (where.find(':') != std::string_view::npos || where.find('?') != std::string_view::npos || !path.has_extension()) {
     return;
@@ -157,7 +159,7 @@ void refuse_missing_file(std::string_view where) {
   std::vector<std::string> files;
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    files.push_back(path.has_parent_path() ? entry.path().string() : entry.path().filename().string());
+    files.push_back(path.has_parent_path() ? os::name_of(entry.path()) : os::name_of(entry.path().filename()));
   }
   const std::vector<std::string_view> names(files.begin(), files.end());
   const std::string_view near = nearest(where, names);

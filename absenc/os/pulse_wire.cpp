@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/pulse_wire.hpp"
 
-#include <sys/ioctl.h>
-#include <termios.h>
-
 #include <cerrno>
 #include <utility>
 
 #include "absenc/os/error.hpp"
 
 namespace absenc::os {
-
-int WireKernel::set_modem_lines(int descriptor, unsigned long request, int lines) {
-  return ::ioctl(descriptor, request, &lines);
-}
 
 gpiod_line* WireKernel::find_gpio(const std::string&) {
   errno = ENOSYS;
@@ -42,7 +35,7 @@ PulseOutput::PulseOutput(PulseWire wire, int descriptor, std::string path, WireK
   if (wire_.kind == PulseWire::Kind::gpio) {
     open_gpio();
   } else {
-    drive(false);  // the kernel sets RTS and DTR when a port is opened, so the wire must be put to rest
+    drive(false);  // the system sets RTS and DTR when a port is opened, so the wire must be put to rest
   }
 }
 
@@ -86,7 +79,7 @@ void PulseOutput::drive(bool active) {
   }
   const bool is_rts = wire_.kind == PulseWire::Kind::rts;
   const bool low = active != wire_.active_high;
-  if (kernel_->set_modem_lines(descriptor_, low ? TIOCMBIS : TIOCMBIC, is_rts ? TIOCM_RTS : TIOCM_DTR) < 0) {
+  if (kernel_->set_modem_line(descriptor_, is_rts ? ModemLine::rts : ModemLine::dtr, low) < 0) {
     throw Failure(Failure::Kind::unsupported, "the port " + path_ + " has no " + (is_rts ? "RTS" : "DTR") +
                                                   " line for the pulse: use an adapter that brings it out, or a GPIO "
                                                   "line");

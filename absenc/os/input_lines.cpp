@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/input_lines.hpp"
 
-#include <poll.h>
-#include <unistd.h>
-
 #include <array>
 #include <cerrno>
-#include <csignal>
+#include <cstdint>
 #include <utility>
+
+#include "absenc/os/input.hpp"
 
 namespace absenc::os {
 
@@ -15,21 +14,17 @@ namespace {
 constexpr std::size_t longest_line = 4096;
 }
 
-// SIGTTIN is ignored: reading the terminal from the background then fails with EIO instead of stopping the program.
-InputLines::InputLines(int descriptor) : descriptor_(descriptor) {
-  if (::isatty(descriptor) == 1) static_cast<void>(::signal(SIGTTIN, SIG_IGN));
-}
+InputLines::InputLines(int descriptor) : descriptor_(descriptor) { allow_background(descriptor); }
 
 std::vector<std::string> InputLines::take() {
   std::vector<std::string> lines;
-  pollfd readable{descriptor_, POLLIN, 0};
-  if (ended_ || ::poll(&readable, 1, 0) <= 0) return lines;
-  std::array<char, longest_line> read{};
-  const ssize_t size = ::read(descriptor_, read.data(), read.size());
+  if (ended_) return lines;
+  std::array<std::uint8_t, longest_line> read{};
+  const std::ptrdiff_t size = read_what_is_there(descriptor_, read);
   if (size < 0 && (errno == EIO || errno == EAGAIN || errno == EINTR)) return lines;
   ended_ = size <= 0;
-  for (ssize_t i = 0; i < size; ++i) {
-    const char c = read[static_cast<std::size_t>(i)];
+  for (std::ptrdiff_t i = 0; i < size; ++i) {
+    const char c = static_cast<char>(read[static_cast<std::size_t>(i)]);
     const bool ends = c == '\n';
     if (!ends) begun_ += c;
     // The line feed of a line that was cut at 4096 bytes begins no new line.

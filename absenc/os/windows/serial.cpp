@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/serial.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/os/windows/errors.hpp"
+#include "absenc/os/windows/overlapped.hpp"
+#include "absenc/os/windows/serial_calls.hpp"
+#include "absenc/os/windows/text.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+// The name of a device must begin like this; without it CreateFile knows only COM1 to COM9.
+constexpr std::string_view device_prefix = R"(\\.\)";
+
+Descriptor open_port(const std::string& path, SerialUse use) {
+  const std::string name = path.starts_with(device_prefix) ? path : std::string(device_prefix) + path;
+  const DWORD access = use == SerialUse::receive ? GENERIC_READ : GENERIC_READ | GENERIC_WRITE;
+  constexpr DWORD alone = 0;  // another program cannot open the port meanwhile
+  Handle port(::CreateFileW(utf16(name).c_str(), access, alone, nullptr, OPEN_EXISTING, FILE_FLAG_OVERLAPPED, nullptr));
+  if (!port) throw open_failure(path, errno_of(::GetLastError()));
+  DCB state{};
+  state.DCBlength = sizeof state;
+  if (!serial_calls().get_state(port.get(), state)) throw open_failure(path, errno_of(::GetLastError()));
+  return descriptor_of(std::make_unique<PortStream>(std::move(port)));
+}
+
+PortStream& stream_of(int descriptor) { return dynamic_cast<PortStream&>(*waitable_of(descriptor)); }
+
+bool uses_rts(const PulseWires& wires) {
+  return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
+}
+
+std::string_view name_of(Parity parity) {
+  switch (parity) {
+    case Parity::odd:
+      return "odd";
+    case Parity::even:
+      return "even";
+    case Parity::none:
+      break;
+  }
+  return "no";
+}
+
+// Sets how the driver controls RTS. Returns false if it refuses.
+bool control_rts(int descriptor, DWORD control) {
+  DCB state{};
+  state.DCBlength = sizeof state;
+  const HANDLE port = serial_handle(descriptor);
+  if (!serial_calls().get_state(port, state)) return false;
+  state.fRtsControl = static_cast<BYTE>(control & 3);
+  return serial_calls().set_state(port, state);
+}
+
+}  // namespace
+
+bool is_pseudo_terminal(const std::string&) { return false; }
+
+SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485, const PulseWires& wires,
+                       WireKernel& kernel, SerialUse use)
+    : DescriptorPort(open_port(path, use), "the port " + path), path_(path) {
+  const auto before = terminal_state(descriptor());
+  if (!before) throw open_failure(path, errno);
+  before_ = *before;
+  ::PurgeComm(serial_handle(descriptor()), PURGE_TXCLEAR);
+  try {
+    apply(settings);
+    if (uses_rts(wires) && rs485 == Rs485::on) {
+      throw Failure(Failure::Kind::unsupported,
+                    "RTS cannot switch the direction of RS-485 and carry pulses: use DTR for them");
+    }
+    if (use == SerialUse::receive) {
+      kernel.set_modem_line(descriptor(), ModemLine::rts, false);  // the adapter must not send
+    } else {
+      set_direction(uses_rts(wires) ? Rs485::off : rs485);
+      take_wires(wires, kernel);
+    }
+  } catch (...) {
+    restore_terminal(descriptor(), before_);
+    throw;
+  }
+  shorten_latency();
+  stream_of(descriptor()).discard_received();
+}
+
+SerialPort::~SerialPort() {
+  stream_of(descriptor()).drain(1s);  // the last bytes leave at their rate
+  restore_terminal(descriptor(), before_);
+}
+
+// A change of the rate leaves parity and stop bits unchanged.
+void SerialPort::change_rate(std::uint32_t rate) {
+  LineSettings settings = line_;
+  settings.rate = rate;
+  stream_of(descriptor()).flush(os::now() + 1s);  // written bytes must leave at the old rate
+  serial_calls().flush(serial_handle(descriptor()));
+  apply(settings);
+}
+
+void SerialPort::apply(const LineSettings& settings) {
+  if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
+  if (settings.data_bits > 8) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " is a UART, and no UART has " +
+                                                  std::to_string(settings.data_bits) +
+                                                  "-bit characters: decode a capture, or emulate with sim:");
+  }
+  const std::optional<LineSettings> given = set_terminal(descriptor(), settings);
+  if (!given) fail(errno);  // the port may disappear between two calls
+  line_ = settings;
+  if (!rates_agree(settings.rate, given->rate)) {
+    throw Failure(Failure::Kind::bad_rate, "the port " + path_ + " cannot do " + std::to_string(settings.rate) +
+                                               " baud, it stays at " + std::to_string(given->rate) +
+                                               ": use another rate, or another adapter");
+  }
+  if (given->parity != settings.parity || given->stop_bits != settings.stop_bits ||
+      given->data_bits != settings.data_bits) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " cannot do " + std::to_string(settings.data_bits) +
+                                                  " data bits, " + std::string(name_of(settings.parity)) +
+                                                  " parity and " + std::to_string(settings.stop_bits) +
+                                                  " stop bits: use another adapter");
+  }
+  set_character_time(settings.character());
+}
+
+// RTS is set while a port is open, as on other systems; with `on` the driver sets it only while it sends. An adapter
+// that switches by itself ignores RTS.
+void SerialPort::set_direction(Rs485 rs485) {
+  if (rs485 != Rs485::on) {
+    control_rts(descriptor(), RTS_CONTROL_ENABLE);
+    return;
+  }
+  kernel_direction_ = control_rts(descriptor(), RTS_CONTROL_TOGGLE);
+  if (!kernel_direction_) {
+    throw Failure(Failure::Kind::unsupported, "the driver of the port " + path_ +
+                                                  " cannot switch the direction of RS-485 by RTS: use an adapter that "
+                                                  "does it by itself, without rs485=on");
+  }
+}
+
+void SerialPort::shorten_latency() {
+  set_latency(10ms);
+  if (const auto milliseconds = latency_timer(path_)) {
+    set_latency(latency() + std::chrono::milliseconds(*milliseconds));
+    if (*milliseconds > 1) {
+      notes_.push_back("the latency timer of " + path_ + " is " + std::to_string(*milliseconds) +
+                       " ms, which limits the readings a second: " + way_to_shorter_latency(path_));
+    }
+  }
+}
+
+void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
+  if (wires.trigger.kind != PulseWire::Kind::none) trigger_.emplace(wires.trigger, descriptor(), path_, kernel);
+  if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
+}
+
+void SerialPort::drive(ExtraWire wire, bool active) {
+  std::optional<PulseOutput>& output = wire == ExtraWire::trigger ? trigger_ : clear_;
+  if (output) return output->drive(active);
+  const std::string name = wire == ExtraWire::trigger ? "trigger" : "clear";
+  throw Failure(Failure::Kind::unsupported,
+                "nothing says which wire carries the pulse: set " + name + "=rts or " + name + "=dtr");
+}
+
+Time SerialPort::pulse_width(ExtraWire wire, Time requested) const {
+  const std::optional<PulseOutput>& output = pulse_output(wire);
+  return output ? output->wire().width.value_or(requested) : requested;
+}
+
+}  // namespace absenc::os

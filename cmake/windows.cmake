@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+# What a build for Windows needs of Debian: headers that are no program code of a system, and GoogleTest's sources. Only
+# these folders are linked into the build tree, because /usr/include has the C library of Linux.
+set(absenc_foreign_headers "${CMAKE_CURRENT_BINARY_DIR}/include")
+file(MAKE_DIRECTORY "${absenc_foreign_headers}")
+foreach(folder IN ITEMS fmt hwy nlohmann toml++)
+  if(NOT IS_DIRECTORY "/usr/include/${folder}")
+    message(FATAL_ERROR "/usr/include/${folder} is missing: ./dev windows installs its package")
+  endif()
+  file(CREATE_LINK "/usr/include/${folder}" "${absenc_foreign_headers}/${folder}" SYMBOLIC)
+endforeach()
+
+add_library(absenc-foreign-headers INTERFACE)
+target_include_directories(absenc-foreign-headers SYSTEM INTERFACE "${absenc_foreign_headers}")
+add_library(fmt::fmt-header-only ALIAS absenc-foreign-headers)
+add_library(nlohmann_json::nlohmann_json ALIAS absenc-foreign-headers)
+
+# Windows 10; without names that collide with ours; with M_PI.
+add_compile_definitions(_WIN32_WINNT=0x0A00 WIN32_LEAN_AND_MEAN NOMINMAX _USE_MATH_DEFINES FMT_HEADER_ONLY=1)
+set(absenc_windows_libraries ws2_32 setupapi)
+
+if(ABSENC_TESTS)
+  set(BUILD_GMOCK ON)
+  set(INSTALL_GTEST OFF)
+  set(gtest_disable_pthreads ON)
+  add_subdirectory(/usr/src/googletest "${CMAKE_CURRENT_BINARY_DIR}/googletest" EXCLUDE_FROM_ALL)
+endif()

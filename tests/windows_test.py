@@ -1,0 +1,457 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tests absenc.exe under wine: COM ports that lead to pseudo-terminals, TCP, files, the console. ABSENC is the command
+for Linux, ABSENC_EXE the one for Windows."""
+import itertools
+import json
+import os
+import re
+import select
+import signal
+import subprocess
+import threading
+import time
+import tty
+import unittest
+
+from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
+from command_support import read_line
+from wine_support import WINE, Prefix
+
+EXE = os.path.abspath(os.environ.get("ABSENC_EXE", "build/windows/bin/absenc.exe"))
+FRAMES = "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n1A\n1A 00 45 23 01 11 34 12 00 00 4B\n"  # the last one is damaged
+prefix = Prefix()
+numbers = itertools.count(10)
+
+
+def setUpModule():
+    prefix.__enter__()
+
+
+def tearDownModule():
+    prefix.__exit__()
+
+
+def windows(*arguments, **settings):
+    """Runs absenc.exe and returns its completed process."""
+    settings.setdefault("stdin", subprocess.DEVNULL)
+    settings.setdefault("timeout", PATIENCE)
+    settings.setdefault("env", prefix.environment)
+    return subprocess.run([WINE, EXE, *arguments], capture_output=True, encoding="utf-8", **settings)
+
+
+class Cable:
+    """Two pseudo-terminals that are connected: what is written to one is read from the other."""
+
+    def __init__(self):
+        self.masters, slaves = zip(os.openpty(), os.openpty())
+        for slave in slaves:
+            tty.setraw(slave)
+        self.slaves = slaves
+        self.paths = [os.ttyname(slave) for slave in slaves]
+        self.wake, self.waker = os.pipe()
+        self.thread = threading.Thread(target=self.carry)
+
+    def carry(self):
+        while True:
+            ready, _, _ = select.select([*self.masters, self.wake], [], [])
+            if self.wake in ready:
+                return
+            for one, other in (self.masters, self.masters[::-1]):
+                if one in ready:
+                    os.write(other, os.read(one, 4096))
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join()
+        for descriptor in (*self.masters, *self.slaves, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class WindowsCase(EncoderCase):
+    def com(self, path):
+        """Returns the name of a new COM port that leads to the terminal at `path`."""
+        number = next(numbers)
+        prefix.link_port(number, path)
+        self.addCleanup(prefix.link_port, number, None)
+        return f"COM{number}"
+
+    def at_com(self, *arguments, latency=300, protocol="tformat"):
+        """Returns the address of a new emulator at a COM port."""
+        emulator = Emulator(self.directory, *arguments, protocol=protocol, name=f"encoder-{next(numbers)}")
+        self.addCleanup(emulator.end)
+        return f"{protocol}:{self.com(emulator.path)}?latency={latency}"
+
+    def begin(self, *arguments, **settings):
+        """Starts absenc.exe in the background."""
+        settings.setdefault("stdin", subprocess.DEVNULL)
+        process = subprocess.Popen([WINE, EXE, *arguments], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   env=prefix.environment, **settings)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        return process
+
+    def dos(self, name):
+        """Returns the path of a file in the test's directory as Windows names it."""
+        return "Z:" + self.file(name).replace("/", "\\")
+
+
+class Basics(WindowsCase):
+    def test_version_and_help_and_wrong_options(self):
+        version = windows("--version")
+        self.assert_good(version)
+        with open(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "VERSION"),
+                  encoding="utf-8") as file:
+            self.assertIn(f"absenc {file.read().strip()}\n", version.stdout)
+        text = windows("--help")
+        self.assert_good(text)
+        self.assertIn("Usage: absenc <verb> ...", text.stdout)
+        self.assertIn("absenc read tformat:COM3", windows("read", "--help").stdout)
+        self.assertNotIn("\r", text.stdout)
+        self.assert_wrong_usage(windows("--nonsense"), "there is no option --nonsense")
+        self.assert_wrong_usage(windows("read", "sim:tformat", "--cuont", "1"), "read has no option --cuont", "--count")
+
+    def test_virtual_encoder_and_all_units(self):
+        result = windows("read", "sim:tformat?motion=rpm=60&multiturn=12", "--count", "3", "--json")
+        self.assert_good(result)
+        self.assertEqual([line["multiturn"] for line in json_lines(result.stdout)], [12, 12, 12])
+        self.assertEqual(windows("list", "--json").stdout, absenc("list", "--json").stdout)
+
+    def test_parts_that_are_left_out_say_so(self):
+        self.assert_failed(windows("serve"), "`absenc serve` is not in this build", "docs/windows.md")
+        self.assert_failed(windows("record", "sim:tformat", "--output", self.dos("a.h5"), "--count", "1"),
+                           "writing HDF5 is not in this build", "docs/windows.md")
+        self.assert_failed(windows("read", "ssi:spi:/dev/spidev0.0"), "SPI controller", "which Windows does not have")
+        can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
+        self.assert_failed(windows("read", f"{can}:can0"), "which Windows does not have", "slcan:COM5")
+        self.assert_failed(windows("emulate", "tformat"), "Windows has no pseudo-terminals", "--tcp")
+        lines = windows("monitor", "sim:tformat", "--for", "1.5")
+        self.assert_good(lines)
+        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
+
+    def test_output_to_a_full_disk_fails(self):
+        with open("/dev/full", "wb") as full:
+            result = subprocess.run([WINE, EXE, "read", "sim:tformat"], stdin=subprocess.DEVNULL, stdout=full,
+                                    stderr=subprocess.PIPE, env=prefix.environment, timeout=PATIENCE, check=False)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(b"standard output cannot be written: No space left", result.stderr)
+
+    def test_closed_output_ends_the_command(self):
+        process = self.begin("read", "sim:tformat", "--count", "0", "--rate", "200")
+        self.assertIsNotNone(read_line(process.stdout, time.monotonic() + PATIENCE))
+        process.stdout.close()
+        self.assertEqual(process.wait(timeout=PATIENCE), 0, process.stderr.read())
+
+
+class Ports(WindowsCase):
+    def test_reads_as_text_and_json(self):
+        address = self.at_com("--singleturn", "65536", "--multiturn", "12")
+        result = windows("read", address)
+        self.assert_good(result)
+        self.assertIn("180.000 deg", result.stdout)
+        self.assertIn("12 turns", result.stdout)
+        lines = json_lines(windows("read", address.lower(), "--json", "--count", "50", "--rate", "0").stdout)
+        self.assertEqual({(line["ok"], line["singleturn"]) for line in lines}, {(True, 65536)})
+        self.assertEqual(len(lines), 50)
+
+    # A pseudo-terminal has no parity, and wine no rate above 4 Mbit/s, so some units are read over TCP here.
+    REFUSED_AT_COM = {"esl": "cannot do 10000000 baud", "hiperface": "even parity", "nikon": "16-bit characters"}
+
+    def test_reads_with_every_serial_unit(self):
+        read = []
+        for name in character_units():
+            with self.subTest(name):
+                plain = absenc("emulate", name, "--for", "0.001", "--pty", self.file(name))
+                if plain.returncode != 0:
+                    self.assertIn("sim:", plain.stderr)  # a pulse asks for its frames, which no port here carries
+                    continue
+                emulator = Emulator(self.directory, "--tcp", "0", protocol=name, name=name)
+                self.addCleanup(emulator.end)
+                tcp = emulator.line().removeprefix("ready: ").strip()
+                rate = "&baud=9600" if "states no baud rate" in absenc("read", f"{name}:/dev/none").stderr else ""
+                at_com = windows("read", f"{name}:{self.com(emulator.path)}?latency=300{rate}", "--json")
+                if name in self.REFUSED_AT_COM:
+                    self.assertIn(self.REFUSED_AT_COM[name], json.loads(at_com.stdout)["message"])
+                else:
+                    self.assert_good(at_com)
+                self.assert_good(windows("read", f"{name}:{tcp}", "--json"))
+                read.append(name)
+        self.assertGreater(len(read), 5)
+
+    def test_silence_is_a_timeout_with_its_evidence(self):
+        result = windows("read", self.at_com("--fault", "silence=1", latency=20))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("timeout: the encoder did not answer", result.stderr)
+        self.assertRegex(result.stderr, r"sent 1A to COM\d+ at 2500000 baud; nothing came back")
+
+    def test_late_replies_never_answer_a_later_request(self):
+        address = self.at_com("--fault", "delay=0.3", "--motion", "rpm=60", latency=20)
+        result = windows("read", address, "--json", "--count", "60", "--rate", "50")
+        lines = json_lines(result.stdout)
+        self.assertIn("timeout", {line.get("error") for line in lines})
+        good = [line for line in lines if line["ok"]]
+        self.assertGreater(len(good), 10)
+        for line in good:
+            turned = (line["multiturn"] + line["angle_deg"] / 360) * 60 / 60  # seconds at 60 rpm
+            self.assertAlmostEqual(turned - line["time_s"], good[0]["multiturn"] + good[0]["angle_deg"] / 360 -
+                                   good[0]["time_s"], delta=0.045)
+
+    def test_echo_is_removed(self):
+        with FakeEncoder() as fake:
+            fake.answer = lambda request: request + bytes.fromhex("1A 00 45 23 01 11 34 12 00 00 4A")
+            result = windows("read", f"tformat:{self.com(fake.path)}?latency=300&echo=on", "--json")
+        self.assert_good(result)
+        self.assertEqual(json.loads(result.stdout)["singleturn"], 0x12345)
+
+    def test_bytes_from_before_are_discarded(self):
+        with FakeEncoder(bytes.fromhex("1A 00 45 23 01 11 34 12 00 00 4A")) as fake:
+            os.write(fake.master, bytes(range(200)))
+            result = windows("read", f"tformat:{self.com(fake.path)}?latency=300", "--json")
+        self.assert_good(result)
+
+    def test_absent_and_unsuitable_ports(self):
+        self.assert_failed(windows("read", "tformat:COM200"), "there is no port COM200")
+        file = self.file("text.txt", "no port")
+        self.assert_failed(windows("read", "tformat:Z:" + file.replace("/", "\\")), "is not a serial port")
+        self.assert_wrong_usage(windows("read", "COM200"), "does not say which protocol", "tformat:COM200")
+        self.assert_wrong_usage(windows("read", "tformat"), "does not say where", "COM")
+
+    def test_direction_by_rts_is_refused_where_the_driver_cannot(self):
+        self.assert_failed(windows("read", self.at_com() + "&rs485=on"), "cannot switch the direction of RS-485 by RTS")
+
+    def test_ports_lists_what_windows_lists(self):
+        subprocess.run([WINE, "reg", "add", r"HKLM\HARDWARE\DEVICEMAP\SERIALCOMM", "/v", r"\Device\Absenc0", "/d",
+                        "COM77", "/f"], env=prefix.environment, check=True, capture_output=True, timeout=PATIENCE)
+        listed = {port["port"]: port for port in json_lines(windows("ports", "--json").stdout)}
+        self.assertEqual(listed["COM77"]["kind"], "serial")
+        self.assertIn("next: absenc identify COM77", windows("ports").stdout)
+
+    def test_unplugged_and_back(self):
+        emulator = Emulator(self.directory, "--singleturn", "65536")
+        number = next(numbers)
+        prefix.link_port(number, emulator.path)
+        process = self.begin("read", f"tformat:COM{number}?latency=300", "--json", "--count", "0", "--rate", "20")
+
+        def wait_for(wanted):
+            deadline = time.monotonic() + PATIENCE
+            while (text := read_line(process.stdout, deadline)) is not None:
+                if wanted(json.loads(text)):
+                    return
+            self.fail(f"in vain waited for it: {end(process)}")
+
+        wait_for(lambda line: line["ok"])
+        prefix.link_port(number, None)
+        emulator.kill()
+        wait_for(lambda line: not line["ok"])
+        with Emulator(self.directory, "--singleturn", "32768", name="again") as again:
+            prefix.link_port(number, again.path)
+            wait_for(lambda line: line["ok"] and line["singleturn"] == 32768)
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("the port went away: 1", messages)
+
+    def test_slcan_adapter_at_a_com_port(self):
+        can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
+        emulator = Emulator(self.directory, protocol=can)
+        self.addCleanup(emulator.end)
+        result = windows("read", f"{can}:slcan:{self.com(emulator.path)}?latency=300", "--json")
+        self.assert_good(result)
+        self.assertTrue(json.loads(result.stdout)["ok"])
+
+
+class Tcp(WindowsCase):
+    def tcp(self, *arguments):
+        emulator = self.emulator("--tcp", "0", *arguments)
+        return emulator, emulator.line().removeprefix("ready: ").strip()
+
+    def test_reads(self):
+        _, place = self.tcp("--singleturn", "65536")
+        lines = json_lines(windows("read", f"tformat:{place}", "--json", "--count", "20", "--rate", "0").stdout)
+        self.assertEqual({(line["ok"], line["singleturn"]) for line in lines}, {(True, 65536)})
+
+    def test_nothing_listens_and_unknown_host(self):
+        emulator, place = self.tcp()
+        emulator.end()
+        self.assert_failed(windows("read", f"tformat:{place}"), "nothing listens on 127.0.0.1 port")
+        self.assert_failed(windows("read", "tformat:tcp:no-such-host.invalid:4001"), "no-such-host.invalid is not known")
+
+    def test_other_end_closes(self):
+        emulator, place = self.tcp()
+        process = self.begin("read", f"tformat:{place}", "--json", "--count", "0", "--rate", "20")
+        self.assertTrue(json.loads(read_line(process.stdout, time.monotonic() + PATIENCE))["ok"])
+        emulator.end()
+        deadline = time.monotonic() + PATIENCE
+        while (text := read_line(process.stdout, deadline)) is not None and json.loads(text)["ok"]:
+            pass
+        self.assertIsNotNone(text)
+        status, _, messages = end(process, signal.SIGINT)
+        self.assertIn("the port went away: 1", messages, status)
+
+
+class Emulates(WindowsCase):
+    def test_for_tcp_clients(self):
+        process = self.begin("emulate", "tformat", "--tcp", "0", "--singleturn", "65536", stdin=subprocess.PIPE)
+        place = read_line(process.stdout, time.monotonic() + PATIENCE)
+        match = re.search(r"tcp:127\.0\.0\.1:\d+", place)
+        self.assertIsNotNone(match, place)
+        for _ in range(2):
+            result = absenc("read", f"tformat:{match[0]}", "--json", "--count", "20", "--rate", "0")
+            self.assert_good(result)
+            self.assertEqual({line["singleturn"] for line in json_lines(result.stdout)}, {65536})
+        process.stdin.write(b"alarm over_heat\n")
+        self.assertIn("ok: raised over_heat", read_line(process.stdout, time.monotonic() + PATIENCE))
+        self.assertEqual(json.loads(absenc("read", f"tformat:{match[0]}", "--json").stdout)["alarms"], ["over_heat"])
+        status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("requests answered", messages)
+
+    def test_tcp_port_in_use(self):
+        emulator = self.emulator("--tcp", "0")
+        port = emulator.line().rsplit(":", 1)[1].strip()
+        self.assert_failed(windows("emulate", "tformat", "--tcp", port), f"TCP port {port} is in use")
+
+    def test_at_a_com_port(self):
+        with Cable() as cable:
+            process = self.begin("emulate", "tformat", "--port", self.com(cable.paths[0]), "--singleturn", "65536")
+            self.assertIn("ready: COM", read_line(process.stdout, time.monotonic() + PATIENCE))
+            result = absenc("read", f"tformat:{cable.paths[1]}?latency=300", "--json", "--count", "20", "--rate", "0")
+            self.assert_good(result)
+            self.assertEqual({line["singleturn"] for line in json_lines(result.stdout)}, {65536})
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+
+    def test_memory_file_with_umlauts_is_owned(self):
+        path = self.dos("Gedächtnis eins.txt")
+        process = self.begin("emulate", "tformat", "--tcp", "0", "--memory", path)
+        place = re.search(r"tcp:[\d.:]+", read_line(process.stdout, time.monotonic() + PATIENCE))[0]
+        self.assert_failed(windows("emulate", "tformat", "--tcp", "0", "--memory", path, "--for", "1"),
+                           "another emulator keeps its memory in")
+        self.assert_good(absenc("memory", "write", f"tformat:{place}", "0x10", "0x42", "--page", "2", "--yes"))
+        self.assertEqual(end(process, signal.SIGINT)[0], 0)
+        with open(self.file("Gedächtnis eins.txt"), encoding="utf-8") as file:
+            self.assertIn(" 42 ", file.read())
+
+
+class Commands(WindowsCase):
+    def test_interrupt_ends_reading_with_its_summary(self):
+        process = self.begin("read", self.at_com(), "--count", "0", "--rate", "20")
+        self.assertIsNotNone(read_line(process.stdout, time.monotonic() + PATIENCE))
+        status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("good readings and 0 failed ones", messages)
+
+    def test_config_memory_and_journal(self):
+        address = self.at_com()
+        self.assert_good(windows("config", "set", address, "overheat-threshold", "80", "--yes"))
+        self.assertIn("80 degC", windows("config", "get", address).stdout)
+        environment = {name: value for name, value in prefix.environment.items() if name != "ABSENC_CHANGES"}
+        self.assert_good(windows("memory", "write", address, "0x10", "0x42", "--page", "2", "--yes", env=environment))
+        self.assertIn("42 00", windows("memory", "read", address, "0x10", "--count", "2", "--page", "2").stdout)
+        journal = os.path.join(prefix.user_folder("Local"), "absenc", "changes.tsv")
+        with open(journal, encoding="utf-8") as file:
+            self.assertIn("memory-write", file.read().replace("memory write", "memory-write"))
+        self.assertIn("memory", windows("changes", address, env=environment).stdout)
+        self.assert_wrong_usage(windows("zero", address), "nobody is there to be asked", "--yes")
+
+    def test_dump_and_load_a_file_with_umlauts_and_spaces(self):
+        address = self.at_com()
+        name = "Meßwerte Übung.txt"
+        self.assert_good(windows("memory", "dump", address, "--output", self.dos(name)))
+        self.assertTrue(os.path.exists(self.file(name)))
+        self.assert_good(windows("memory", "verify", address, self.dos(name)))
+
+    def test_records_into_files_with_umlauts_and_spaces(self):
+        address = self.at_com("--motion", "rpm=60")
+        for ending in ("csv", "jsonl"):
+            name = f"Aufnahme für Jürgen.{ending}"
+            self.assert_good(windows("record", address, "--output", self.dos(name), "--count", "20", "--rate", "50"))
+            with open(self.file(name), encoding="utf-8", newline="") as file:
+                text = file.read()
+            self.assertNotIn("\r", text)
+            self.assertGreaterEqual(len(text.splitlines()), 20)
+            again = windows("record", address, "--output", self.dos(name), "--count", "1")
+            self.assert_failed(again, "there is already a file", "für Jürgen")
+
+    def test_names_in_the_settings_file_of_the_user(self):
+        folder = os.path.join(prefix.user_folder("Roaming"), "absenc")
+        os.makedirs(folder, exist_ok=True)
+        path = os.path.join(folder, "absenc.toml")
+        self.addCleanup(os.remove, path)
+        address = self.at_com("--singleturn", "65536")
+        port = re.search(r"COM\d+", address)[0]
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(f'[encoder.elbow]\nprotocol = "tformat"\nport = "{port}"\nlatency = 300\n')
+        environment = {name: value for name, value in prefix.environment.items() if name != "ABSENC_CONFIG"}
+        result = windows("read", "elbow", "--json", env=environment, cwd=self.directory)
+        self.assert_good(result)
+        self.assertEqual(json.loads(result.stdout)["singleturn"], 65536)
+
+    def test_scan_finds_all_on_a_line(self):
+        address = self.at_com("--also", "address=3", "--also", "address=5", protocol="esl", latency=100) + "&baud=2500000"
+        result = windows("scan", address, "--json")
+        self.assert_good(result)
+        found = [one["encoder_address"] for one in json.loads(result.stdout)["encoders"]]
+        self.assertEqual(found, [0, 3, 5])
+
+    def test_identify_finds_the_protocol(self):
+        place = self.at_com(latency=100).removeprefix("tformat:")
+        result = windows("identify", place, "--json", timeout=3 * PATIENCE)
+        self.assert_good(result)
+        self.assertIn("tformat:COM", result.stdout)
+
+    def test_doctor_calls_it_good(self):
+        result = windows("doctor", self.at_com(latency=100))
+        self.assert_good(result)
+        self.assertTrue(result.stdout.startswith("good: "), result.stdout)
+        silent = windows("doctor", self.at_com("--fault", "silence=1", latency=20))
+        self.assertEqual(silent.returncode, 1)
+        self.assertIn("no_answer", silent.stdout)
+
+    def test_conform_of_serial_units(self):
+        for name in ("tformat", "encolink", "esl", "amt21"):
+            with self.subTest(name):
+                rate = "&baud=2500000" if name == "esl" else ""
+                result = windows("conform", self.at_com(protocol=name, latency=100) + rate, "--readings", "3",
+                                 timeout=3 * PATIENCE)
+                self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+
+
+class Captures(WindowsCase):
+    def test_decodes_as_on_linux(self):
+        frames = self.file("Rahmen ä.txt", FRAMES)
+        files = [frames]
+        for ending in ("vcd", "csv"):
+            files.append(self.file(f"Welle ü.{ending}"))
+            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", files[-1], "--count", "20"))
+        for file in files:
+            with self.subTest(file):
+                there = windows("decode", "tformat", "Z:" + file, "--json")
+                here = absenc("decode", "tformat", file, "--json")
+                self.assertEqual(there.stdout, here.stdout)
+                self.assertEqual(there.returncode, here.returncode)
+                self.assertGreater(len(here.stdout.splitlines()), 1)
+
+    def test_draws_the_same_waveform(self):
+        for ending in ("vcd", "csv"):
+            self.assert_good(windows("wave", "sim:tformat", self.dos(f"dort ü.{ending}")))
+            self.assert_good(absenc("wave", "sim:tformat", self.file(f"hier.{ending}")))
+            with open(self.file(f"dort ü.{ending}"), "rb") as there, open(self.file(f"hier.{ending}"), "rb") as here:
+                self.assertEqual(there.read(), here.read())
+
+    def test_archives_of_sigrok_are_refused_in_words(self):
+        self.assert_good(absenc("wave", "sim:tformat", self.file("a.sr")))
+        self.assert_failed(windows("decode", "tformat", self.dos("a.sr")), "zip archive", "built without the libraries",
+                           "export VCD or CSV")
+
+    def test_standard_input(self):
+        there = subprocess.run([WINE, EXE, "decode", "tformat", "-", "--json"], input=FRAMES.encode(),
+                               capture_output=True, env=prefix.environment, timeout=PATIENCE, check=False)
+        self.assertEqual(there.stdout.decode(), absenc("decode", "tformat", self.file("frames.txt", FRAMES), "--json").stdout)
+        self.assertIn(str(0x12345), there.stdout.decode())
+
+
+if __name__ == "__main__":
+    unittest.main()
