@@ -61,8 +61,8 @@ absenc_package(libabsenc-dev libdevel "${PROJECT_DESCRIPTION} (development files
 if(TARGET absenc-client)
   # absenc::client needs none of the suggested packages: they are for absenc::captures, absenc::ftdi, absenc::gpio and
   # absenc::hdf5
-  set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SUGGESTS
-      "libdeflate-dev, libftdi1-dev, libgpiod-dev, libhdf5-dev, libhwy-dev, libminizip-dev")
+  string(JOIN ", " CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SUGGESTS
+         libdeflate-dev libftdi1-dev libgpiod-dev libhdf5-dev libhwy-dev libminizip-dev libusb-1.0-0-dev)
 endif()
 
 if(TARGET absenc-python)
