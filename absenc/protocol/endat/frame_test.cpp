@@ -90,7 +90,7 @@ constexpr Format rotary{.singleturn_bits = 25};
 struct FollowerBench {
   void follow(const Request& request, const Reply& reply, std::size_t zeros = 3) {
     BitBuffer<256> bits;
-    bits.append(0, static_cast<unsigned>(turn_bits + zeros));
+    for (std::size_t i = 0; i < turn_bits + zeros; ++i) bits.append(0, 1);
     encode_reply(format, request.code, reply, bits);
     while (bits.size() < 240) bits.append(1, 1);
     follower.follow(number++, encode_request(request).bytes(), bits.bytes());
