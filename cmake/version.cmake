@@ -14,7 +14,7 @@ elseif(GIT_FOUND AND EXISTS "${PROJECT_SOURCE_DIR}/.git")
 endif()
 
 set(absenc_built_in)
-foreach(part IN ITEMS "GPIO:GPIO lines" "CUSE:emulated SPI devices")
+foreach(part IN ITEMS "FTDI:FTDI chips" "GPIO:GPIO lines" "CUSE:emulated SPI devices")
   string(REGEX REPLACE ":.*" "" option "${part}")
   string(REGEX REPLACE ".*:" "" name "${part}")
   if(ABSENC_${option})
