@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink frames of RLS AksIM-2 encoders: positions, cycles of channel 2 (one byte in each reply, a cycle in seven), and
-// the identity. README.md draws them.
+// EncoLink frames of RLS AksIM-2 encoders: positions, cycles of channel 2 (one byte in each reply, a cycle in seven),
+// and the identity. README.md draws them.
 #pragma once
 
 #include <array>
