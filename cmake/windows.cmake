@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What a build for Windows needs of Debian: headers that are no program code of a system, and GoogleTest's sources. Only
+# Provides a build for Windows with packages of Debian: headers that suit any system, and the sources of GoogleTest. Only
 # these folders are linked into the build tree, because /usr/include has the C library of Linux.
 set(absenc_foreign_headers "${CMAKE_CURRENT_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${absenc_foreign_headers}")

@@ -145,10 +145,9 @@ class LateReplyTest(unittest.TestCase):
         for encoder in ENCODERS:
             with self.subTest(encoder):
                 relay, address = self.pty_relay(encoder, lambda n: 0.06 if n == 6 else 0)
-                done = absenc("read", address, "--count", "20", "--rate", "50", "--json")
+                done = absenc("read", address, "--count", "40", "--rate", "50", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]
-                # On a busy machine other replies are late, too.
-                self.assertGreater(self.check(encoder, relay, rows), 5)
+                self.assertGreater(self.check(encoder, relay, rows), 10)
 
     def test_all_replies_late(self):
         """The command must report an error with advice, and no position of an earlier request."""

@@ -36,6 +36,10 @@ class OutputFile {
   /// Writes `bytes` at offset `at`. Returns 0 or a value of errno; after an error, some of the bytes may have been
   /// written.
   [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
+  /// Sets the size of the file. Returns 0 or a value of errno.
+  [[nodiscard]] int resize(std::uint64_t size);
+  /// Throws Failure for a file that cannot be made at `path`; `error`: the value of errno.
+  [[noreturn]] static void refuse(const std::string& path, int error);
 
   std::string path_;
   Descriptor file_;

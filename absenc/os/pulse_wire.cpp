@@ -45,6 +45,10 @@ PulseOutput::~PulseOutput() {
 
 void PulseOutput::open_gpio() {
   const std::string what = "the GPIO line " + wire_.name;
+  if (!has_gpio_lines()) {
+    throw Failure(Failure::Kind::unsupported,
+                  what + " is a place of Linux, which this system does not have: use RTS or DTR");
+  }
   const auto refused = [&](int error) {
     if (error == EACCES || error == EPERM) {
       return Failure(Failure::Kind::no_permission,

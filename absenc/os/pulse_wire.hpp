@@ -43,6 +43,8 @@ struct WireKernel {
   virtual void release_gpio(gpiod_line* line);
 };
 [[nodiscard]] WireKernel& system_wires();
+/// Returns whether this system has GPIO lines, with or without absenc::gpio.
+[[nodiscard]] bool has_gpio_lines();
 /// Replaces the result of `system_wires` by `kernel`, which must outlive all ports. Call it before threads are started.
 void set_system_wires(WireKernel& kernel);
 

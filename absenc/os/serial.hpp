@@ -54,12 +54,17 @@ class SerialPort final : public DescriptorPort {
   [[nodiscard]] const std::optional<PulseOutput>& pulse_output(ExtraWire wire) const {
     return wire == ExtraWire::trigger ? trigger_ : clear_;
   }
+  /// Returns whether RTS carries a pulse. Throws Failure if RTS is to switch the direction, too.
+  [[nodiscard]] static bool uses_rts(const PulseWires& wires, Rs485 rs485);
   void apply(const LineSettings& settings);
+  /// Returns whether the port is the device's end of a USB cable, which has no line and accepts any rate.
+  [[nodiscard]] bool is_gadget() const;
+  /// Returns the end of the error for a rate that the driver has refused: which rate it set, and what to try.
+  [[nodiscard]] std::string rate_instead(std::uint32_t requested, std::uint32_t given) const;
   void lock() const;
   void set_direction(Rs485 rs485);
   void take_wires(const PulseWires& wires, WireKernel& kernel);
   void shorten_latency();
-  [[nodiscard]] std::uint32_t clock_of_rates() const;
 
   std::string path_;
   bool pseudo_ = false;

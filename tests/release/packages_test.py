@@ -36,7 +36,7 @@ class Installed(RootCase):
         cls.case = cls()
         for package in PACKAGES:
             cls.case.put(artefact(f"{package}_*_amd64.deb"))
-        cls.case.shell("dpkg -i /work/*.deb", timeout=300)
+        cls.case.shell("dpkg -i /srv/*.deb", timeout=300)
 
     def test_command(self):
         self.try_the_command("absenc")
@@ -49,13 +49,13 @@ class Installed(RootCase):
     def test_each_format_of_captures(self):
         for ending in ("sr", "vcd", "csv"):
             with self.subTest(ending):
-                name = f"/work/wave.{ending}"
+                name = f"/srv/wave.{ending}"
                 self.run_inside("absenc", "wave", "tformat", name)
                 self.assertIn("deg", self.run_inside("absenc", "decode", "tformat", name))
 
     def test_hdf5(self):
-        self.run_inside("absenc", "record", "sim:tformat", "--output", "/work/log.h5", "--count", "3")
-        said = self.run_inside("python3", "-c", "import h5py; print(len(h5py.File('/work/log.h5')['time_s']))")
+        self.run_inside("absenc", "record", "sim:tformat", "--output", "/srv/log.h5", "--count", "3")
+        said = self.run_inside("python3", "-c", "import h5py; print(len(h5py.File('/srv/log.h5')['time_s']))")
         self.assertEqual(said, "3\n")
 
     def test_server_with_its_page(self):
@@ -96,13 +96,13 @@ class Upgraded(RootCase):
         (old / "DEBIAN").mkdir()
         (old / "DEBIAN/control").write_text("Package: absenc\nVersion: 0.1.0\nArchitecture: amd64\nMaintainer: a <a@b.invalid>\n"
                                             "Description: old\n")
-        subprocess.run(["dpkg-deb", "--root-owner-group", "-b", old, self.root / "work/old.deb"], check=True, capture_output=True)
-        self.shell("dpkg -i /work/old.deb; mkdir -p /etc/absenc /var/lib/absenc; echo x > /etc/absenc/absenc.toml;"
+        subprocess.run(["dpkg-deb", "--root-owner-group", "-b", old, self.root / "srv/old.deb"], check=True, capture_output=True)
+        self.shell("dpkg -i /srv/old.deb; mkdir -p /etc/absenc /var/lib/absenc; echo x > /etc/absenc/absenc.toml;"
                    "echo x > /var/lib/absenc/history.sqlite")
         for package in ("absenc", "absenc-serve", "absenc-hdf5"):
             self.put(artefact(f"{package}_*_amd64.deb"))
         # apt installs the packages in this order, because absenc-serve breaks the old absenc
-        self.shell("dpkg -i /work/absenc_*.deb; dpkg -i /work/absenc-*.deb", timeout=300)
+        self.shell("dpkg -i /srv/absenc_*.deb; dpkg -i /srv/absenc-*.deb", timeout=300)
         self.assertIn(f"absenc {VERSION}", self.run_inside("absenc", "--version"))
         self.assertIn("absenc-serve", self.shell("dpkg -S lib/systemd/system/absenc.service"))
         self.shell("dpkg -r absenc-serve absenc-hdf5 absenc")

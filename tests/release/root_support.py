@@ -55,20 +55,20 @@ class RootCase(unittest.TestCase):
         cls.root.mkdir()
         if cls.archive is not None:
             subprocess.run(["tar", "-xf", cls.archive(), "-C", cls.root, "--exclude=./dev/*"], check=True)
-        for folder in ("dev", "proc", "tmp", "work"):
+        for folder in ("dev", "proc", "tmp", "srv"):
             (cls.root / folder).mkdir(exist_ok=True)
 
     def run_inside(self, *command, status=0, timeout=120):
         done = subprocess.run([*ISOLATED, str(self.root), *map(str, command)], stdin=subprocess.DEVNULL,
                               capture_output=True, text=True, timeout=timeout,
-                              env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/work", "LC_ALL": "C.UTF-8",
+                              env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/srv", "LC_ALL": "C.UTF-8",
                                    "DEBIAN_FRONTEND": "noninteractive"})
         if status is not None:
             self.assertEqual(done.returncode, status, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}")
         return done.stdout + done.stderr
 
     def put(self, path, name=None):
-        shutil.copy(path, self.root / "work" / (name or Path(path).name))
+        shutil.copy(path, self.root / "srv" / (name or Path(path).name))
 
     def shell(self, script, **settings):
         return self.run_inside("sh", "-euc", script, **settings)
@@ -80,12 +80,12 @@ class RootCase(unittest.TestCase):
         self.assertIn("tformat", self.run_inside(absenc, "list"))
         self.assertIn("turns", self.run_inside(absenc, "read", "sim:tformat"))
         # one reply in the capture tformat.txt is damaged on purpose
-        self.assertIn("bad_checksum", self.run_inside(absenc, "decode", "tformat", "/work/tformat.txt", "--csv", status=1))
-        self.assertIn("tformat", self.run_inside(absenc, "identify", "/work/tformat.txt"))
+        self.assertIn("bad_checksum", self.run_inside(absenc, "decode", "tformat", "/srv/tformat.txt", "--csv", status=1))
+        self.assertIn("tformat", self.run_inside(absenc, "identify", "/srv/tformat.txt"))
         self.assertIn("good", self.run_inside(absenc, "doctor", "sim:tformat", "--readings", "100"))
-        self.run_inside(absenc, "record", "sim:tformat", "--output", "/work/log.csv", "--count", "3")
-        self.assertTrue((self.root / "work/log.csv").read_text().startswith("# absenc record 1\n"))
-        (self.root / "work/log.csv").unlink()
+        self.run_inside(absenc, "record", "sim:tformat", "--output", "/srv/log.csv", "--count", "3")
+        self.assertTrue((self.root / "srv/log.csv").read_text().startswith("# absenc record 1\n"))
+        (self.root / "srv/log.csv").unlink()
         said = self.shell(f"""
             {absenc} emulate tformat --tcp 0 --for 20 >/tmp/emulator 2>&1 & emulator=$!
             while ! grep -q '^ready: tcp' /tmp/emulator; do kill -0 $emulator; done

@@ -16,14 +16,14 @@ class InDebian11(RootCase):
 
     def test_command(self):
         self.put(artefact(f"{NAME}.tar.gz"))
-        self.shell(f"cd /work; tar -xzf {NAME}.tar.gz")
-        self.try_the_command(f"/work/{NAME}/bin/absenc")
+        self.shell(f"cd /srv; tar -xzf {NAME}.tar.gz")
+        self.try_the_command(f"/srv/{NAME}/bin/absenc")
 
     def test_completion_and_man_page(self):
         self.put(artefact(f"{NAME}.tar.gz"))
-        self.shell(f"cd /work; tar -xzf {NAME}.tar.gz")
-        self.run_inside("bash", "-c", f"source /work/{NAME}/share/bash-completion/completions/absenc; complete -p absenc")
-        self.assertIn(".TH", (self.root / f"work/{NAME}/share/man/man1/absenc.1").read_text())
+        self.shell(f"cd /srv; tar -xzf {NAME}.tar.gz")
+        self.run_inside("bash", "-c", f"source /srv/{NAME}/share/bash-completion/completions/absenc; complete -p absenc")
+        self.assertIn(".TH", (self.root / f"srv/{NAME}/share/man/man1/absenc.1").read_text())
 
 
 class WithoutCLibrary(RootCase):
@@ -40,10 +40,10 @@ class WithoutCLibrary(RootCase):
             (cls.root / "bin" / tool).symlink_to("busybox")
 
     def test_command(self):
-        subprocess.run(["tar", "-xzf", artefact(f"{NAME}.tar.gz"), "-C", self.root / "work"], check=True)
+        subprocess.run(["tar", "-xzf", artefact(f"{NAME}.tar.gz"), "-C", self.root / "srv"], check=True)
         self.assertEqual(list(self.root.rglob("libc.so*")), [])
-        self.try_the_command(f"/work/{NAME}/bin/absenc")
-        said = self.run_inside(f"/work/{NAME}/bin/absenc", "serve", status=1)
+        self.try_the_command(f"/srv/{NAME}/bin/absenc")
+        said = self.run_inside(f"/srv/{NAME}/bin/absenc", "serve", status=1)
         self.assertIn("Install the package absenc-serve", said)
 
 

@@ -18,18 +18,13 @@
 #include "tools/absenc/command_line.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
+#include "tools/absenc/optional_ports.hpp"
 #include "tools/absenc/parts.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/verbs/run.hpp"
 #include "tools/absenc/version.hpp"
-#ifdef ABSENC_FTDI
-#include "absenc/os/ftdi.hpp"  // FTDI chips can be opened as ports only in programs that include this header
-#endif
-#ifdef ABSENC_GPIO
-#include "absenc/os/gpio.hpp"  // ports can send pulses on GPIO lines only in programs that include this header
-#endif
 
 namespace absenc::tool {
 

@@ -211,7 +211,7 @@ std::vector<Other> other_models(const EncoderAddress& address) {
   for (const Model& model : unit.models) {
     Options options;
     if (resolve_options(unit, model.name, {}, options).kind != OptionError::Kind::none) continue;
-    // What no model describes, such as the rate of a clock, stays as the user gave it.
+    // Options that no model sets, such as the rate of a clock, keep the value that the user gave.
     for (std::size_t i = 0; i < unit.options.size(); ++i) {
       if (!is_of_models(i)) options.values[i] = address.options[i];
     }

@@ -17,29 +17,6 @@ namespace absenc::os {
 
 namespace {
 
-Failure::Kind kind_of(int error) {
-  switch (error) {
-    case EEXIST:
-      return Failure::Kind::in_use;
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return Failure::Kind::no_permission;
-    case ENOENT:
-    case ENOTDIR:
-      return Failure::Kind::not_found;
-    default:
-      return Failure::Kind::system;
-  }
-}
-
-[[noreturn]] void refuse(const std::string& path, int error) {
-  if (error == EEXIST)
-    throw Failure(Failure::Kind::in_use,
-                  "there is already a file " + path + ", which stays as it is: choose another name");
-  throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
-}
-
 // Renames `from` to `to` and returns 0, or a value of errno: EEXIST if `to` exists.
 int rename_to_new(const std::string& from, const std::string& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
@@ -121,25 +98,8 @@ int OutputFile::put(std::uint64_t at, std::string_view bytes) {
   return 0;
 }
 
-void LineFile::append(std::string_view lines) {
-  require_there();
-  const int error = put(size(), lines);
-  if (error == 0) return;
-  [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), static_cast<off_t>(size()));
-  throw system_failure("writing " + path_, error);
-}
-
-void BlockFile::write(std::uint64_t at, Bytes bytes) {
-  require_there();
-  const int error = put(at, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  if (error != 0) throw system_failure("writing " + path_, error);
-}
-
-void BlockFile::grow(std::uint64_t size) {
-  require_there();
-  if (size <= size_) return;
-  if (::ftruncate(file_.get(), static_cast<off_t>(size)) < 0) throw system_failure("writing " + path_, errno);
-  size_ = size;
+int OutputFile::resize(std::uint64_t size) {
+  return ::ftruncate(file_.get(), static_cast<off_t>(size)) == 0 ? 0 : errno;
 }
 
 void BlockFile::read(std::uint64_t at, MutableBytes bytes) const {

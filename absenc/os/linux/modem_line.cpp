@@ -11,4 +11,6 @@ int WireKernel::set_modem_line(int descriptor, ModemLine line, bool set) {
   return ::ioctl(descriptor, set ? TIOCMBIS : TIOCMBIC, &lines);
 }
 
+bool has_gpio_lines() { return true; }
+
 }  // namespace absenc::os

@@ -158,10 +158,4 @@ Descriptor nameless_file(const std::string& folder) {
   return file;
 }
 
-void replace_file(const std::string& path, std::string_view content, Durable durable) {
-  NewFile file(path);
-  file.write(content);
-  file.take_place(durable);
-}
-
 }  // namespace absenc::os

@@ -11,7 +11,7 @@
 
 #include <cerrno>
 #include <filesystem>
-#include <string_view>
+#include <string>
 
 #include "absenc/os/error.hpp"
 
@@ -38,28 +38,6 @@ bool is_pseudo_terminal(int descriptor) {
   return ::fstat(descriptor, &status) == 0 && is_pseudo(status);
 }
 
-bool uses_rts(const PulseWires& wires) {
-  return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
-}
-
-// A gadget port (ttyGS of u_serial.c) is the device's end of a USB cable: it has no line and accepts any rate.
-bool is_gadget(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::canonical(path, ignored).filename().native().starts_with("ttyGS");
-}
-
-std::string_view name_of(Parity parity) {
-  switch (parity) {
-    case Parity::odd:
-      return "odd";
-    case Parity::even:
-      return "even";
-    case Parity::none:
-      break;
-  }
-  return "no";
-}
-
 }  // namespace
 
 bool is_pseudo_terminal(const std::string& path) {
@@ -79,15 +57,12 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   ::tcflush(descriptor(), TCOFLUSH);  // unsent bytes of another program must not delay the first request
   try {
     apply(settings);
-    if (uses_rts(wires) && rs485 == Rs485::on) {
-      throw Failure(Failure::Kind::unsupported,
-                    "RTS cannot switch the direction of RS-485 and carry pulses: use DTR or a GPIO line for them");
-    }
+    const bool with_rts = uses_rts(wires, rs485);
     if (use == SerialUse::receive) {
       const int rts = TIOCM_RTS;  // RTS is cleared: the kernel set it when the port was opened
       ::ioctl(descriptor(), TIOCMBIC, &rts);
     } else {
-      set_direction(uses_rts(wires) ? Rs485::off : rs485);
+      set_direction(with_rts ? Rs485::off : rs485);
       take_wires(wires, kernel);
     }
   } catch (...) {
@@ -118,39 +93,18 @@ void SerialPort::change_rate(std::uint32_t rate) {
   apply(settings);
 }
 
-void SerialPort::apply(const LineSettings& settings) {
-  if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
-  if (settings.data_bits > 8 && !pseudo_) {
-    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " is a UART, and no UART has " +
-                                                  std::to_string(settings.data_bits) +
-                                                  "-bit characters: decode a capture, or emulate with sim:");
-  }
-  const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
-  if (!set) fail(errno);  // the adapter may have been unplugged since the port was opened
-  const LineSettings given = *set;
-  line_ = settings;
-  if (is_gadget(path_)) return;
-  if (!rates_agree(settings.rate, given.rate)) {
-    throw Failure(Failure::Kind::bad_rate,
-                  "the port " + path_ + " cannot do " + std::to_string(settings.rate) + " baud, its nearest rate is " +
-                      std::to_string(nearest_rate(settings.rate, given.rate, clock_of_rates())) +
-                      ": use that, or another adapter");
-  }
-  if (pseudo_) return;  // a pseudo-terminal has no line: parity is ignored and characters take no time
-  if (given.parity != settings.parity || given.stop_bits != settings.stop_bits ||
-      given.data_bits != settings.data_bits) {
-    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " cannot do " + std::to_string(settings.data_bits) +
-                                                  " data bits, " + std::string(name_of(settings.parity)) +
-                                                  " parity and " + std::to_string(settings.stop_bits) +
-                                                  " stop bits: use another adapter");
-  }
-  set_character_time(settings.character());
+// A gadget port (ttyGS of u_serial.c) is the device's end of a USB cable.
+bool SerialPort::is_gadget() const {
+  std::error_code ignored;
+  return std::filesystem::canonical(path_, ignored).filename().native().starts_with("ttyGS");
 }
 
-std::uint32_t SerialPort::clock_of_rates() const {
+std::string SerialPort::rate_instead(std::uint32_t requested, std::uint32_t given) const {
   serial_struct serial{};
-  if (::ioctl(descriptor(), TIOCGSERIAL, &serial) < 0 || serial.baud_base < 0) return 0;
-  return static_cast<std::uint32_t>(serial.baud_base);
+  const bool known = ::ioctl(descriptor(), TIOCGSERIAL, &serial) == 0 && serial.baud_base >= 0;
+  const std::uint32_t clock = known ? static_cast<std::uint32_t>(serial.baud_base) : 0;
+  return "its nearest rate is " + std::to_string(nearest_rate(requested, given, clock)) +
+         ": use that, or another adapter";
 }
 
 void SerialPort::set_direction(Rs485 rs485) {
@@ -193,24 +147,6 @@ void SerialPort::shorten_latency() {
                        " ms, which limits the readings a second: " + way_to_shorter_latency(terminal));
     }
   }
-}
-
-void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
-  if (wires.trigger.kind != PulseWire::Kind::none) trigger_.emplace(wires.trigger, descriptor(), path_, kernel);
-  if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
-}
-
-void SerialPort::drive(ExtraWire wire, bool active) {
-  std::optional<PulseOutput>& output = wire == ExtraWire::trigger ? trigger_ : clear_;
-  if (output) return output->drive(active);
-  const std::string name = wire == ExtraWire::trigger ? "trigger" : "clear";
-  throw Failure(Failure::Kind::unsupported, "nothing says which wire carries the pulse: set " + name + "=rts, " + name +
-                                                "=dtr or " + name + "=gpio:NAME");
-}
-
-Time SerialPort::pulse_width(ExtraWire wire, Time requested) const {
-  const std::optional<PulseOutput>& output = pulse_output(wire);
-  return output ? output->wire().width.value_or(requested) : requested;
 }
 
 }  // namespace absenc::os

@@ -18,30 +18,6 @@
 
 namespace absenc::os {
 
-namespace {
-
-Failure::Kind kind_of(int error) {
-  switch (error) {
-    case EACCES:
-    case EROFS:
-      return Failure::Kind::no_permission;
-    case ENOENT:
-    case ENOTDIR:
-      return Failure::Kind::not_found;
-    default:
-      return Failure::Kind::system;
-  }
-}
-
-[[noreturn]] void refuse(const std::string& path, int error) {
-  if (error == EEXIST)
-    throw Failure(Failure::Kind::in_use,
-                  "there is already a file " + path + ", which stays as it is: choose another name");
-  throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
-}
-
-}  // namespace
-
 OutputFile::OutputFile(const std::string& path, Appears appears) : path_(path), appeared_(appears == Appears::at_once) {
   std::error_code ignored;
   if (std::filesystem::exists(path_of(path), ignored)) refuse(path, EEXIST);
@@ -83,26 +59,7 @@ int OutputFile::put(std::uint64_t at, std::string_view bytes) {
   return error;
 }
 
-void LineFile::append(std::string_view lines) {
-  require_there();
-  const int error = put(size(), lines);
-  if (error == 0) return;
-  [[maybe_unused]] const int ignored = set_size(file_.get(), size());
-  throw system_failure("writing " + path_, error);
-}
-
-void BlockFile::write(std::uint64_t at, Bytes bytes) {
-  require_there();
-  const int error = put(at, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  if (error != 0) throw system_failure("writing " + path_, error);
-}
-
-void BlockFile::grow(std::uint64_t size) {
-  require_there();
-  if (size <= size_) return;
-  if (const int error = set_size(file_.get(), size); error != 0) throw system_failure("writing " + path_, error);
-  size_ = size;
-}
+int OutputFile::resize(std::uint64_t size) { return set_size(file_.get(), size); }
 
 void BlockFile::read(std::uint64_t at, MutableBytes bytes) const {
   const std::string content = read_at(file_.get(), at, bytes.size(), path_);

@@ -35,22 +35,6 @@ Descriptor open_port(const std::string& path, SerialUse use) {
 
 PortStream& stream_of(int descriptor) { return dynamic_cast<PortStream&>(*waitable_of(descriptor)); }
 
-bool uses_rts(const PulseWires& wires) {
-  return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
-}
-
-std::string_view name_of(Parity parity) {
-  switch (parity) {
-    case Parity::odd:
-      return "odd";
-    case Parity::even:
-      return "even";
-    case Parity::none:
-      break;
-  }
-  return "no";
-}
-
 // Sets how the driver controls RTS. Returns false if it refuses.
 bool control_rts(int descriptor, DWORD control) {
   DCB state{};
@@ -74,14 +58,11 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   ::PurgeComm(serial_handle(descriptor()), PURGE_TXCLEAR);
   try {
     apply(settings);
-    if (uses_rts(wires) && rs485 == Rs485::on) {
-      throw Failure(Failure::Kind::unsupported,
-                    "RTS cannot switch the direction of RS-485 and carry pulses: use DTR for them");
-    }
+    const bool with_rts = uses_rts(wires, rs485);
     if (use == SerialUse::receive) {
       kernel.set_modem_line(descriptor(), ModemLine::rts, false);  // the adapter must not send
     } else {
-      set_direction(uses_rts(wires) ? Rs485::off : rs485);
+      set_direction(with_rts ? Rs485::off : rs485);
       take_wires(wires, kernel);
     }
   } catch (...) {
@@ -106,29 +87,10 @@ void SerialPort::change_rate(std::uint32_t rate) {
   apply(settings);
 }
 
-void SerialPort::apply(const LineSettings& settings) {
-  if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
-  if (settings.data_bits > 8) {
-    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " is a UART, and no UART has " +
-                                                  std::to_string(settings.data_bits) +
-                                                  "-bit characters: decode a capture, or emulate with sim:");
-  }
-  const std::optional<LineSettings> given = set_terminal(descriptor(), settings);
-  if (!given) fail(errno);  // the port may disappear between two calls
-  line_ = settings;
-  if (!rates_agree(settings.rate, given->rate)) {
-    throw Failure(Failure::Kind::bad_rate, "the port " + path_ + " cannot do " + std::to_string(settings.rate) +
-                                               " baud, it stays at " + std::to_string(given->rate) +
-                                               ": use another rate, or another adapter");
-  }
-  if (given->parity != settings.parity || given->stop_bits != settings.stop_bits ||
-      given->data_bits != settings.data_bits) {
-    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " cannot do " + std::to_string(settings.data_bits) +
-                                                  " data bits, " + std::string(name_of(settings.parity)) +
-                                                  " parity and " + std::to_string(settings.stop_bits) +
-                                                  " stop bits: use another adapter");
-  }
-  set_character_time(settings.character());
+bool SerialPort::is_gadget() const { return false; }
+
+std::string SerialPort::rate_instead(std::uint32_t, std::uint32_t given) const {
+  return "it stays at " + std::to_string(given) + ": use another rate, or another adapter";
 }
 
 // RTS is set while a port is open, as on other systems; with `on` the driver sets it only while it sends. An adapter
@@ -155,24 +117,6 @@ void SerialPort::shorten_latency() {
                        " ms, which limits the readings a second: " + way_to_shorter_latency(path_));
     }
   }
-}
-
-void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
-  if (wires.trigger.kind != PulseWire::Kind::none) trigger_.emplace(wires.trigger, descriptor(), path_, kernel);
-  if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
-}
-
-void SerialPort::drive(ExtraWire wire, bool active) {
-  std::optional<PulseOutput>& output = wire == ExtraWire::trigger ? trigger_ : clear_;
-  if (output) return output->drive(active);
-  const std::string name = wire == ExtraWire::trigger ? "trigger" : "clear";
-  throw Failure(Failure::Kind::unsupported,
-                "nothing says which wire carries the pulse: set " + name + "=rts or " + name + "=dtr");
-}
-
-Time SerialPort::pulse_width(ExtraWire wire, Time requested) const {
-  const std::optional<PulseOutput>& output = pulse_output(wire);
-  return output ? output->wire().width.value_or(requested) : requested;
 }
 
 }  // namespace absenc::os

@@ -122,4 +122,6 @@ int WireKernel::set_modem_line(int descriptor, ModemLine line, bool set) {
   return serial_calls().escape(serial_handle(descriptor), function) ? 0 : -1;
 }
 
+bool has_gpio_lines() { return false; }
+
 }  // namespace absenc::os

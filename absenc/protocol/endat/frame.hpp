@@ -3,79 +3,16 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 
-#include "absenc/core/angle.hpp"
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/protocol/author/bit_engine.hpp"
-#include "absenc/protocol/endat/format.hpp"
+#include "absenc/protocol/endat/mode_command.hpp"
 
 namespace absenc::endat {
-
-/// Mode commands, the six bits of a request.
-enum class ModeCommand : std::uint8_t {
-  position = 0b000'111,
-  select = 0b001'110,
-  write = 0b011'100,
-  read = 0b100'011,
-  reset = 0b101'010,
-  test_values = 0b010'101,
-  test = 0b110'001,
-  communicate = 0b010'010,
-  position_22 = 0b111'000,
-  select_22 = 0b001'001,
-  write_22 = 0b011'011,
-  read_22 = 0b100'100,
-  error_reset_22 = 0b101'101,
-  test_22 = 0b110'110,
-};
-
-/// Returns whether `code` is a mode command of section "Mode commands".
-[[nodiscard]] constexpr bool is_code(std::uint8_t code) {
-  switch (static_cast<ModeCommand>(code)) {
-    case ModeCommand::position:
-    case ModeCommand::select:
-    case ModeCommand::write:
-    case ModeCommand::read:
-    case ModeCommand::reset:
-    case ModeCommand::test_values:
-    case ModeCommand::test:
-    case ModeCommand::communicate:
-    case ModeCommand::position_22:
-    case ModeCommand::select_22:
-    case ModeCommand::write_22:
-    case ModeCommand::read_22:
-    case ModeCommand::error_reset_22:
-    case ModeCommand::test_22:
-      return true;
-  }
-  return false;
-}
-/// Returns whether the host sends 24 bits of parameters directly behind the mode command.
-[[nodiscard]] constexpr bool has_parameters(ModeCommand code) {
-  return code == ModeCommand::select || code == ModeCommand::write || code == ModeCommand::read ||
-         code == ModeCommand::reset || code == ModeCommand::test || code == ModeCommand::communicate;
-}
-/// Returns whether the host sends a supplement of 24 bits behind the position.
-[[nodiscard]] constexpr bool has_supplement(ModeCommand code) {
-  return code == ModeCommand::select_22 || code == ModeCommand::write_22 || code == ModeCommand::read_22 ||
-         code == ModeCommand::error_reset_22 || code == ModeCommand::test_22;
-}
-/// Returns whether the reply has a position with two error bits and additional information (EnDat 2.2).
-[[nodiscard]] constexpr bool is_22(ModeCommand code) {
-  return code == ModeCommand::position_22 || has_supplement(code);
-}
-/// Returns whether the reply has a position.
-[[nodiscard]] constexpr bool has_position(ModeCommand code) { return code == ModeCommand::position || is_22(code); }
-
-/// Returns the mode command that reads a position from an encoder with this format.
-[[nodiscard]] constexpr ModeCommand position_command(const Format& format) {
-  return format.version == CommandSet::v21 ? ModeCommand::position : ModeCommand::position_22;
-}
 
 /// A request: mode command with its parameters or its supplement.
 struct Request {
@@ -434,67 +371,6 @@ constexpr void encode_reply(const Format& format, ModeCommand code, const Reply&
   const std::size_t end = size + find_start(reply) + 1 + reply_size(format, static_cast<ModeCommand>(code));
   if (end < burst.size) static_cast<void>(ranges.push_back({.first = end, .count = burst.size - end}));
   return ranges;
-}
-
-// ---- Alarms and reading
-
-/// Bits of the alarms of a reading.
-namespace alarm {
-inline constexpr std::uint32_t errors = 0x7F;       ///< Error messages: word 0 of the operating status.
-inline constexpr unsigned warnings_shift = 8;       ///< Place of the warnings: word 1 of the operating status.
-inline constexpr std::uint32_t warnings = 0x1F00;   ///< Warnings.
-inline constexpr std::uint32_t error = 1u << 14;    ///< F1 or F2: the position is wrong.
-inline constexpr std::uint32_t warning = 1u << 15;  ///< WRN: at least one warning is set.
-}  // namespace alarm
-
-/// Returns the alarms of the words of the operating status.
-[[nodiscard]] constexpr std::uint32_t alarms_of(std::uint16_t errors, std::uint16_t warnings) {
-  return (errors & alarm::errors) | (std::uint32_t{warnings} << alarm::warnings_shift & alarm::warnings);
-}
-
-/// Completes a reading by the error messages and warnings that were read behind it.
-constexpr void add_alarms(Reading& reading, const AlarmWords& words) {
-  const auto [errors, warnings] = words;
-  // WRN is known from additional information only, unless a warning is set.
-  const bool knows_group = warnings != 0 || (reading.alarms_reported & alarm::warning) != 0;
-  reading.alarms &= alarm::error | alarm::warning;
-  const bool wrong = errors != 0 || reading.singleturn_valid_bits == 0;
-  reading.alarms |= alarms_of(errors, warnings) | (wrong ? alarm::error : 0) | (warnings != 0 ? alarm::warning : 0);
-  reading.alarms_reported = alarm::errors | alarm::warnings | alarm::error | (knows_group ? alarm::warning : 0);
-  if (errors != 0) reading.singleturn_valid_bits = 0;
-  reading.multiturn_valid = reading.multiturn_valid && errors == 0;
-}
-
-/// Returns whether an error bit says that the position is wrong.
-[[nodiscard]] constexpr bool has_error(ModeCommand code, const Reply& reply) {
-  return reply.f1 || (is_22(code) && !reply.f2);
-}
-
-/// Returns the reading of a reply; an empty one if the reply has no position. F1 and F2 say whether any error message
-/// is set, WRN says the same of warnings; without additional information warnings are unknown.
-[[nodiscard]] constexpr Reading reading_of(const Format& given, ModeCommand code, const Reply& reply) {
-  Reading reading;
-  if (!has_position(code)) return reading;
-  const Format format = with_resolution(given);
-  const bool wrong = has_error(code, reply);
-  const Resolution resolution = format.resolution();
-  reading.unit_um = resolution.unit_um;
-  reading.singleturn_bits = resolution.singleturn_bits;
-  reading.multiturn_bits = resolution.multiturn_bits;
-  reading.singleturn = reply.position & low_mask(resolution.singleturn_bits);
-  reading.multiturn = resolution.multiturn_bits == 0 ? 0 : reply.position >> resolution.singleturn_bits;
-  reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
-  reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
-  // Without additional information nothing tells of warnings: which alarms are raised stays open until they are read.
-  if (reply.info_count != 0) {
-    reading.alarms = wrong ? alarm::error : 0;
-    reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
-    const bool warns = reply.infos[0].warning;
-    if (warns) reading.alarms |= alarm::warning;
-    reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;
-  }
-  if (reply.alarm_words) add_alarms(reading, *reply.alarm_words);
-  return reading;
 }
 
 }  // namespace absenc::endat

@@ -11,6 +11,7 @@
 
 #include "absenc/protocol/endat/alarm_follower.hpp"
 #include "absenc/protocol/endat/protocol.hpp"
+#include "absenc/protocol/endat/reading.hpp"
 
 namespace absenc::endat {
 namespace {

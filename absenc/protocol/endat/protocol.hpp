@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "absenc/protocol/author/bit_host.hpp"
-#include "absenc/protocol/endat/frame.hpp"
+#include "absenc/protocol/endat/reading.hpp"
 
 namespace absenc::endat {
 
