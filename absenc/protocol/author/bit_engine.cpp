@@ -9,9 +9,9 @@ namespace absenc::author {
 // ---- Calls of the subclass
 
 void BitEngine::send(const BitRequest& request, const Manner& manner, Time earliest) {
+  earliest_ = std::max(earliest, received_at_ + request_.hold);
   request_ = request;
   manner_ = manner;
-  earliest_ = earliest;
   state_ = State::ready;
   if (request.clocks > 8 * storage_.size()) finish(Error::invalid_argument);
 }
@@ -23,6 +23,7 @@ void BitEngine::sleep(Time time) {
 
 void BitEngine::finish(Error error, Time hold) {
   error_ = error;
+  hold = std::max(hold, request_.hold);
   earliest_ = received_at_ + hold;
   state_ = hold == Time{} ? State::over : State::ending;
 }

@@ -26,6 +26,9 @@ struct BitRequest {
   std::size_t late_clocks = 0;
   std::uint32_t rate = 0;  ///< Rate of the clock in Hz.
   Time rest{};             ///< Shortest time from the last exchange to this one.
+  /// Shortest time from this exchange to the next one; also to that of another conversation, whose `rest` may be
+  /// shorter.
+  Time hold{};
 
   /// Returns whether there are no bits to send: the request has no encoding.
   [[nodiscard]] constexpr bool empty() const { return bits.size() == 0; }

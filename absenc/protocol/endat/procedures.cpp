@@ -16,7 +16,6 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
   std::uint8_t selected = 0;
   const std::uint16_t errors = co_await read_word_21(dialog, selected, error_word, "");
   const std::uint16_t warnings = co_await read_word_21(dialog, selected, warning_word, "");
-  co_await dialog.rest(long_recovery);
   add_alarms(found.reading, {errors, warnings});
   found.alarms = static_cast<std::uint16_t>(found.reading.alarms);
   found.command.reset();  // the values are of several exchanges
@@ -55,7 +54,6 @@ Procedure clear_alarms(Dialog& dialog, ProcedureResult& found) {
     // If the reply is lost, the alarms that are read afterwards show whether they were cleared.
     static_cast<void>(co_await dialog.attempt({.code = ModeCommand::write, .byte = word.address, .word = 0}).changes());
   }
-  co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
   const std::uint32_t alarms = co_await read_alarms(dialog, found);
   if (alarms != 0) {
@@ -119,7 +117,6 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
   co_await append_words(dialog, selected, found, id_words, 3);
   co_await append_words(dialog, selected, found, serial_words, 3);
   const std::uint16_t set = co_await read_word_21(dialog, selected, command_set_word, "");
-  co_await dialog.rest(long_recovery);
   found.bits = static_cast<std::uint8_t>(count & 0x3F);
   found.type = type;
   found.kind = kind_of(type);
@@ -247,7 +244,6 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
 Procedure read_recovery(Dialog& dialog, ProcedureResult& found) {
   std::uint8_t selected = 0;
   const std::uint16_t word = co_await read_word_21(dialog, selected, initialisation_word, "");
-  co_await dialog.rest(long_recovery);
   found.recovery = (word & recovery_mask) == short_recovery_bits ? 1 : 0;
   co_return done;
 }
@@ -264,13 +260,9 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
   const auto wanted = static_cast<std::uint16_t>((before & ~recovery_mask) | bits);
   found.recovery = static_cast<std::uint8_t>(arguments[0]);
   found.written = wanted != before;
-  if (wanted == before) {
-    co_await dialog.rest(long_recovery);
-    co_return done;
-  }
+  if (wanted == before) co_return done;
   const std::uint16_t now = co_await write_word_21(dialog, selected, initialisation_word, wanted,
                                                    "the recovery time was written, but could not be read back");
-  co_await dialog.rest(long_recovery);
   if (now == wanted) co_return done;
   if (now == before) dialog.refused();
   co_return {Error::cross_check_failed, "the encoder has another recovery time than was written",
@@ -301,7 +293,6 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
 Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const SelectedInfos before = co_await find_selection(dialog);
-  co_await select_22(dialog, mrs::nothing, "");
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
   found.temperature = (static_cast<double>(tenths) * 10 - 27'315) / 100;
