@@ -3,7 +3,7 @@
 // because no port of this machine takes the encoder's side of a data line that turns.
 #include <array>
 
-#include "absenc/protocol/endat/frame.hpp"
+#include "absenc/protocol/endat/reading.hpp"
 #include "absenc/protocol/endat/unit.hpp"
 
 namespace absenc::endat {
@@ -12,6 +12,11 @@ namespace {
 /// Requirements on EnDat encoders.
 constexpr auto clauses = std::array{
     Clause{"crc", "Checksum", "five bits of CRC, inverted, over the error bits and the position", Demand::checked},
+    Clause{.id = "start-bit",
+           .paragraph = "The line",
+           .words = "behind the mode command zeros, then the start bit within latency_us",
+           .demand = Demand::as_drawn,
+           .errors = any_of(Error::line_stuck, Error::truncated)},
     Clause{.id = "memory-write",
            .paragraph = "Memory",
            .words = "a word that was written is read again",
@@ -28,6 +33,14 @@ constexpr auto clauses = std::array{
            .paragraph = "Zero by datum shift",
            .words = "the datum shift makes this the zero of the turn, to a signal period",
            .demand = Demand::zero},
+    // Error messages are not the case that tests show: while one is set, no zero may be set either.
+    Clause{.id = "clear-alarms",
+           .paragraph = "Alarms",
+           .words = "0 written to the warnings clears them, and nothing else",
+           .demand = Demand::reset,
+           .value = alarm::warnings,
+           .verb = Verb::clear_alarms,
+           .shown_with = "info1=0x40"},
 };
 
 }  // namespace

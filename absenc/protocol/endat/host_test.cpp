@@ -57,9 +57,29 @@ TEST(EndatHost, KeepsRecoveryTimeOfEachVersion) {
     const Time before = bench.line.now();
     Ask host(format, {.code = ModeCommand::position_22});
     bench.run(host);
-    EXPECT_EQ(host.begun_at() - before, recovery == Recovery::long_time ? long_recovery : short_recovery);
+    EXPECT_EQ(host.begun_at() - before, recovery == Recovery::long_time ? Time(30us) : Time(3750ns));
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
   }
+}
+
+TEST(EndatHost, WaitsForTheLongestTimesOfTheSources) {
+  Format format = rotary;
+  format.clock_khz = 8000;
+  Bench slow(format, {.latency = 10us, .read_time = 11'990us});
+  EXPECT_TRUE(ask(slow, format, {.code = ModeCommand::position_22})) << "the default of latency_us";
+  EXPECT_TRUE(ask(slow, format, {.code = ModeCommand::select, .byte = area::maker_1})) << "an access takes up to 12 ms";
+}
+
+TEST(EndatEncoder, TakesThePeriodOfItsFormatIfThePortDoesNotKnowIt) {
+  testing::SetShaft shaft;
+  VirtualEncoder encoder(rotary, shaft, {.latency = 20us});
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  constexpr std::array<std::uint8_t, 1> command{0x38};
+  encoder.feed({.kind = ByteEvent::Kind::selected, .at = 1ms});
+  encoder.feed({.kind = ByteEvent::Kind::received, .at = 1ms + 8us, .items = command, .bits = 8});
+  const ByteStep step = encoder.next(1ms + 8us);
+  EXPECT_EQ(find_start({step.out, 8 * step.out.size()}), 20u - command_bits) << "1 MHz";
+  EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
 TEST(EndatEncoder, IgnoresExchangeWithinRecoveryTime) {

@@ -136,15 +136,26 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
 
 // ---- Resets, zero, recovery time
 
+namespace {
+
+// Notes that the encoder has ended the selection of additional information, and returns the one from before.
+SelectedInfos end_selection(Dialog& dialog) {
+  Format format = dialog.format();
+  const SelectedInfos before{format.info1, format.info2};
+  format.info1 = format.info2 = 0;
+  dialog.set_format(format);
+  return before;
+}
+
+}  // namespace
+
 Procedure reset(Dialog& dialog, ProcedureResult& found) {
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset}).changes());
   co_await dialog.rest(reset_time);
-  // A reset ends the selection of additional information.
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos before = end_selection(dialog);
   co_await know_resolution(dialog);
   co_await look(dialog, found);
+  co_await restore(dialog, before);
   co_return done;
 }
 
@@ -152,12 +163,12 @@ Procedure reset_errors(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   co_await find_selection(dialog);
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::error_reset_22}).changes());
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos before = end_selection(dialog);
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
-  if (has_error(ModeCommand::position_22, dialog.last())) {
+  const bool remains = has_error(ModeCommand::position_22, dialog.last());
+  co_await restore(dialog, before);
+  if (remains) {
     co_return {Error::cross_check_failed, "an error remains",
                "`absenc run ... status` names it, then `absenc clear-alarms`"};
   }
@@ -226,10 +237,9 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset})
                         .or_say("the datum shift is stored and holds after the next start"));
   co_await dialog.rest(reset_time);
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos selection = end_selection(dialog);
   const Reading now = co_await look(dialog, found);
+  co_await restore(dialog, selection);
   found.datum_shift = static_cast<std::int32_t>(wanted);
   found.command.reset();
   const bool is_zero = is_near(now.singleturn, 0, now.singleturn_bits, zero_millidegrees) ||
