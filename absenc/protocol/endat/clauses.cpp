@@ -29,11 +29,8 @@ constexpr auto clauses = std::array{
            .demand = Demand::byte_alone,
            .page = 0xA9,
            .address = 8},
-    Clause{.id = "zero",
-           .paragraph = "Zero by datum shift",
-           .words = "the datum shift makes this the zero of the turn, to a signal period",
-           .demand = Demand::zero},
-    // Error messages are not the case that tests show: while one is set, no zero may be set either.
+    // Before the zero, which resets the encoder. Tests show it with a warning, because no zero may be set while an error
+    // message is set.
     Clause{.id = "clear-alarms",
            .paragraph = "Alarms",
            .words = "0 written to the warnings clears them, and nothing else",
@@ -41,6 +38,10 @@ constexpr auto clauses = std::array{
            .value = alarm::warnings,
            .verb = Verb::clear_alarms,
            .shown_with = "info1=0x40"},
+    Clause{.id = "zero",
+           .paragraph = "Zero by datum shift",
+           .words = "the datum shift makes this the zero of the turn, to a signal period",
+           .demand = Demand::zero},
 };
 
 }  // namespace
