@@ -16,6 +16,7 @@ import threading
 import time
 import tty
 import unittest
+import zipfile
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
@@ -575,6 +576,79 @@ class Recordings(WindowsCase):
         self.assertEqual(status, 0, messages)
         self.assertIn("went away", messages)
         self.assertIn("the port is back after", messages)
+
+
+class Library(WindowsCase):
+    """The archive with the C++ library, in a project that finds it with find_package."""
+
+    PROJECT = """
+cmake_minimum_required(VERSION 3.25)
+project(outside LANGUAGES CXX)
+find_package(absenc {version} REQUIRED)
+add_executable(outside outside.cpp)
+target_link_libraries(outside PRIVATE absenc::configuration absenc::captures absenc::recording)
+target_link_options(outside PRIVATE -static)
+"""
+    # Reads the first argument, records an encoder that absenc.toml names, and decodes a capture.
+    PROGRAM = r"""
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/configuration.hpp"
+#include "absenc/client/decode.hpp"
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/recording.hpp"
+
+using namespace absenc;
+
+int main(int, char** arguments) try {
+  client::Encoder encoder = client::open(arguments[1]);
+  std::printf("%u\n", static_cast<unsigned>(encoder.read().singleturn));
+  client::Encoder elbow = client::open("elbow");
+  client::Recording recording({.path = arguments[2], .encoder = "elbow", .count = 3}, elbow);
+  std::printf("%d\n", recording.run());
+  for (const client::Row& row : client::decode(arguments[3], "tformat")) {
+    std::printf("%s\n", client::to_text(row.values[0]).c_str());
+    break;
+  }
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
+"""
+
+    def run_here(self, *command):
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=5 * PATIENCE,
+                              check=False)
+        self.assert_good(done)
+
+    def test_program_finds_the_library_and_reads(self):
+        root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+        with open(os.path.join(root, "VERSION"), encoding="utf-8") as file:
+            version = file.read().strip()
+        name = f"absenc-{version}-windows-x64-dev"
+        with zipfile.ZipFile(os.path.join(os.path.dirname(os.path.dirname(EXE)), f"{name}.zip")) as archive:
+            archive.extractall(self.directory)
+        self.file("CMakeLists.txt", self.PROJECT.format(version=version))
+        self.file("outside.cpp", self.PROGRAM)
+        self.run_here("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
+                      "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
+                      "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
+        self.run_here("cmake", "--build", self.file("build"))
+        com = self.at_com("--singleturn", "65536")
+        port = re.search(r"COM\d+", com)[0]
+        self.file("absenc.toml", f'[encoder.elbow]\nprotocol = "tformat"\nport = "{port}"\nlatency = 300\n')
+        self.file("wave.vcd", conversation(3).vcd())
+        environment = {name: value for name, value in prefix.environment.items() if name != "ABSENC_CONFIG"}
+        for address, position in (("sim:tformat?singleturn=1234", 1234), (com, 65536)):
+            result = subprocess.run([WINE, self.file("build/outside.exe"), address, self.dos(f"{position}.csv"),
+                                     self.dos("wave.vcd")], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                    env=environment, cwd=self.directory, timeout=PATIENCE, check=False)
+            self.assert_good(result)
+            self.assertEqual(result.stdout.splitlines()[:2], [str(position), "1"])
+            self.assertEqual(len(result.stdout.splitlines()), 3)
+            with open(self.file(f"{position}.csv"), encoding="utf-8") as file:
+                self.assertIn(",65536,", file.read())
 
 
 class Captures(WindowsCase):
