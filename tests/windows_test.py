@@ -2,20 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests absenc.exe under wine: COM ports that lead to pseudo-terminals, TCP, files, the console. ABSENC is the command
 for Linux, ABSENC_EXE the one for Windows."""
+import contextlib
 import itertools
 import json
 import os
 import re
 import select
 import signal
+import struct
 import subprocess
+import sys
 import threading
 import time
 import tty
 import unittest
+import zipfile
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
+from decode_file_test import conversation
 from wine_support import WINE, Prefix
 
 EXE = os.path.abspath(os.environ.get("ABSENC_EXE", "build/windows/bin/absenc.exe"))
@@ -157,30 +162,6 @@ class Ports(WindowsCase):
         self.assertEqual({(line["ok"], line["singleturn"]) for line in lines}, {(True, 65536)})
         self.assertEqual(len(lines), 50)
 
-    # A pseudo-terminal has no parity, and wine no rate above 4 Mbit/s, so some units are read over TCP here.
-    REFUSED_AT_COM = {"esl": "cannot do 10000000 baud", "hiperface": "even parity", "nikon": "16-bit characters"}
-
-    def test_reads_with_every_serial_unit(self):
-        read = []
-        for name in character_units():
-            with self.subTest(name):
-                plain = absenc("emulate", name, "--for", "0.001", "--pty", self.file(name))
-                if plain.returncode != 0:
-                    self.assertIn("sim:", plain.stderr)  # a pulse asks for its frames, which no port here carries
-                    continue
-                emulator = Emulator(self.directory, "--tcp", "0", protocol=name, name=name)
-                self.addCleanup(emulator.end)
-                tcp = emulator.line().removeprefix("ready: ").strip()
-                rate = "&baud=9600" if "states no baud rate" in absenc("read", f"{name}:/dev/none").stderr else ""
-                at_com = windows("read", f"{name}:{self.com(emulator.path)}?latency=300{rate}", "--json")
-                if name in self.REFUSED_AT_COM:
-                    self.assertIn(self.REFUSED_AT_COM[name], json.loads(at_com.stdout)["message"])
-                else:
-                    self.assert_good(at_com)
-                self.assert_good(windows("read", f"{name}:{tcp}", "--json"))
-                read.append(name)
-        self.assertGreater(len(read), 5)
-
     def test_silence_is_a_timeout_with_its_evidence(self):
         result = windows("read", self.at_com("--fault", "silence=1", latency=20))
         self.assertEqual(result.returncode, 1)
@@ -221,6 +202,7 @@ class Ports(WindowsCase):
 
     def test_direction_by_rts_is_refused_where_the_driver_cannot(self):
         self.assert_failed(windows("read", self.at_com() + "&rs485=on"), "cannot switch the direction of RS-485 by RTS")
+        self.assert_failed(windows("read", self.at_com() + "&rs485=rts"), "has no RTS line to switch the direction")
 
     def test_ports_lists_what_windows_lists(self):
         subprocess.run([WINE, "reg", "add", r"HKLM\HARDWARE\DEVICEMAP\SERIALCOMM", "/v", r"\Device\Absenc0", "/d",
@@ -410,29 +392,295 @@ class Commands(WindowsCase):
         self.assertEqual(silent.returncode, 1)
         self.assertIn("no_answer", silent.stdout)
 
-    def test_conform_of_serial_units(self):
-        for name in ("tformat", "encolink", "esl", "amt21"):
+
+class SerialUnits(WindowsCase):
+    """Every unit with a serial line, at a COM port where wine can carry its line there, and over TCP."""
+
+    # A pseudo-terminal has no parity, and no UART has characters of 16 bits.
+    REFUSALS = "no parity|even parity|odd parity|16-bit characters"
+
+    def rate(self, unit):
+        """Returns the setting of the rate at a COM port: some units have none of their own, and wine has none above
+        4 Mbit/s."""
+        rate = unit["line"]["rate"]
+        return "&baud=9600" if rate is None else "&baud=2500000" if rate > 4_000_000 else ""
+
+    def emulated(self, name, unit):
+        """Starts Linux's emulator of a unit and returns its addresses for absenc.exe, at a COM port (None if wine cannot
+        carry its line there) and over TCP."""
+        emulator = Emulator(self.directory, "--tcp", "0", protocol=name, name=name)
+        self.addCleanup(emulator.end)
+        tcp = f"{name}:{emulator.line().removeprefix('ready: ').strip()}?latency=100"
+        com = f"{name}:{self.com(emulator.path)}?latency=100{self.rate(unit)}"
+        refused = windows("read", com)
+        if refused.returncode == 0:
+            return com, tcp
+        self.assertRegex(refused.stderr, self.REFUSALS)
+        return None, tcp
+
+    def test_absenc_exe_reads_the_encoders_of_linux(self):
+        at_com = []
+        for name, unit in character_units().items():
             with self.subTest(name):
-                rate = "&baud=2500000" if name == "esl" else ""
-                result = windows("conform", self.at_com(protocol=name, latency=100) + rate, "--readings", "3",
-                                 timeout=3 * PATIENCE)
-                self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+                com, tcp = self.emulated(name, unit)
+                for address in filter(None, (com, tcp)):
+                    readings = json_lines(windows("read", address, "--json", "--count", "3").stdout)
+                    self.assertEqual([reading["ok"] for reading in readings], [True] * 3, readings)
+                at_com += [name] * (com is not None)
+        self.assertGreater(len(at_com), 5)
+
+    def assert_conforms(self, result):
+        self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+        self.assertIn("kept: ", result.stdout)
+
+    def test_encoders_of_linux_keep_the_clauses_for_absenc_exe(self):
+        for name, unit in character_units().items():
+            with self.subTest(name):
+                com, tcp = self.emulated(name, unit)
+                self.assert_conforms(windows("conform", com or tcp, "--readings", "3", timeout=3 * PATIENCE))
+
+    def test_encoders_of_absenc_exe_keep_the_clauses_for_linux(self):
+        for name, unit in character_units().items():
+            with self.subTest(name):
+                encoder = self.begin("emulate", name, "--tcp", "0")
+                place = re.search(r"tcp:[\d.:]+", read_line(encoder.stdout, time.monotonic() + PATIENCE))[0]
+                self.assert_conforms(absenc("conform", f"{name}:{place}?latency=100", "--readings", "3",
+                                            timeout=3 * PATIENCE))
+                self.assertEqual(end(encoder, signal.SIGINT)[0], 0)
+
+    def verdicts(self, address):
+        result = absenc("conform", address, "--readings", "3", "--json", timeout=3 * PATIENCE)
+        return {one["id"]: one["verdict"] for one in json.loads(result.stdout)["clauses"]}
+
+    def test_encoders_of_absenc_exe_are_judged_as_those_of_linux_at_a_com_port(self):
+        """The cable carries no rate, so a clause about a request at a wrong rate is broken with both."""
+        at_com = []
+        for name, unit in character_units().items():
+            rate = self.rate(unit)
+            with self.subTest(name), Cable() as cable:
+                encoder = self.begin("emulate", name, "--port", f"{self.com(cable.paths[0])}?{rate[1:]}".rstrip("?"))
+                if read_line(encoder.stdout, time.monotonic() + PATIENCE) is None:
+                    self.assertRegex(end(encoder)[2], self.REFUSALS)
+                    continue
+                there = self.verdicts(f"{name}:{cable.paths[1]}?latency=100{rate}")
+                self.assertEqual(end(encoder, signal.SIGINT)[0], 0)
+                folder, port = os.path.split(cable.paths[0])
+                with Emulator(folder, protocol=name, line="--port", name=f"{port}?latency=100{rate}"):
+                    here = self.verdicts(f"{name}:{cable.paths[1]}?latency=100{rate}")
+                self.assertEqual(there, here)
+                self.assertIn("kept", there.values())
+                at_com.append(name)
+        self.assertGreater(len(at_com), 5)
+
+    def test_hosts_keep_the_clauses(self):
+        """The host of Linux at the judge of absenc.exe, and the other way round."""
+        seen = 0
+        for name in character_units():
+            for judged, judge in ((absenc, self.begin), (windows, self.start)):
+                with self.subTest(f"{name}, judged by {judge.__name__}"):
+                    process = judge("conform-host", name, "--tcp", "0", "--answers", "3", "--patience", "1", "--json")
+                    place = None
+                    while place is None:
+                        line = read_line(process.stderr, time.monotonic() + PATIENCE)
+                        self.assertIsNotNone(line)
+                        place = re.search(r"tcp:[\d.:]+", line)
+                        if "is asked nothing" in line:
+                            break
+                    if place is None:
+                        process.communicate(timeout=PATIENCE)
+                        self.assertEqual(process.returncode, 2)
+                        continue
+                    judged("read", f"{name}:{place[0]}?latency=100", "--count", "30", "--rate", "0")
+                    out, messages = process.communicate(timeout=PATIENCE)
+                    verdicts = {one["id"]: one["verdict"] for one in json.loads(out)["clauses"]}
+                    self.assertEqual((process.returncode, verdicts["asks"]), (0, "kept"), f"{verdicts}\n{messages}")
+                    seen += 1
+        self.assertGreater(seen, 10)
+
+    def test_encoder_and_port_follow_a_new_rate(self):
+        """Of every unit with such a setting: after it the encoder answers at the new rate only."""
+        changed = 0
+        for name, unit in character_units().items():
+            option = next((one for one in unit["options"] if one.get("role") == "rate"), None)
+            commands = {command["name"] for command in unit["commands"]}
+            if option is None or f"set-{option['name']}" not in commands:
+                continue
+            with self.subTest(name):
+                com, _ = self.emulated(name, unit)
+                if com is None:
+                    continue
+                new = next(value for value in reversed(option["choices"]) if value != option["default"])
+                self.assert_good(windows("config", "set", com, option["name"], new, "--yes"))
+                old = windows("read", com)
+                self.assertEqual(old.returncode, 1, old.stdout)
+                self.assert_good(windows("read", f"{com}&{option['name']}={new}"))
+                changed += 1
+        self.assertGreater(changed, 0)
+
+
+class Recordings(WindowsCase):
+    def test_full_disk(self):
+        """Uses a file system of 1 MB in a namespace of its own, and a wine prefix in there, because wine's server opens
+        all files."""
+        folder, messages = self.file("disk"), self.file("messages")
+        os.mkdir(folder)
+        shell = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--mount"]
+        support = os.path.join(os.path.dirname(os.path.abspath(__file__)), "wine_support.py")
+        for ending in ("csv", "jsonl"):
+            with self.subTest(ending):
+                copy = self.file(f"copy.{ending}")
+                script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$2" -B "$3" "$4" "$5" record sim:tformat '
+                          '--rate 0 --output "Z:$1/log.$8" 2>"$6"; echo "status $?"; cp "$1/log.$8" "$7"')
+                result = subprocess.run([*shell, "sh", "-c", script, "sh", folder, sys.executable, support, WINE, EXE,
+                                         messages, copy, ending], stdin=subprocess.DEVNULL, capture_output=True,
+                                        text=True, timeout=5 * PATIENCE, check=False)
+                self.assertEqual((result.returncode, result.stdout), (0, "status 1\n"), result.stderr)
+                with open(messages, encoding="utf-8") as file:
+                    text = file.read()
+                self.assert_sentence(text, "No space left on device", "what is written so far is whole")
+                with open(copy, encoding="utf-8") as file:
+                    written = file.read()
+                self.assertTrue(written.endswith("\n"))
+                self.assertGreater(len(written), 2**20 - 3 * 4096)
+                readings = int(re.search(r"(\d+) readings", text)[1])
+                rows = [line for line in written.splitlines() if line[0] in ("{" if ending == "jsonl" else "0123456789")]
+                self.assertGreaterEqual(len(rows), readings)  # a gap has a row, too
+
+    def test_unplugged_and_back(self):
+        number = next(numbers)
+        path = self.file("log.csv")
+
+        def wait_for(event):
+            deadline = time.monotonic() + PATIENCE
+            while True:
+                with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8") as file:
+                    rows = [line.split(",") for line in file.read().splitlines() if line[:1].isdigit()]
+                    if any(event(row) for row in rows):
+                        return
+                if time.monotonic() > deadline:
+                    self.fail(f"in vain waited for it: {end(process)}")
+
+        first = Emulator(self.directory, "--singleturn", "1000")
+        prefix.link_port(number, first.path)
+        self.addCleanup(prefix.link_port, number, None)
+        process = self.begin("record", f"tformat:COM{number}?latency=300", "--output", self.dos("log.csv"), "--rate", "50")
+        wait_for(lambda row: row[2] == "1000")
+        prefix.link_port(number, None)
+        first.kill()
+        first.process.communicate()
+        wait_for(lambda row: row[-1] == "lost")
+        with Emulator(self.directory, "--singleturn", "2000", name="again") as again:
+            prefix.link_port(number, again.path)
+            wait_for(lambda row: row[2] == "2000")
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("went away", messages)
+        self.assertIn("the port is back after", messages)
+
+
+class Library(WindowsCase):
+    """The archive with the C++ library, in a project that finds it with find_package."""
+
+    PROJECT = """
+cmake_minimum_required(VERSION 3.25)
+project(outside LANGUAGES CXX)
+find_package(absenc {version} REQUIRED)
+add_executable(outside outside.cpp)
+target_link_libraries(outside PRIVATE absenc::configuration absenc::captures absenc::recording)
+target_link_options(outside PRIVATE -static)
+"""
+    # Reads the first argument, records an encoder that absenc.toml names, and decodes a capture.
+    PROGRAM = r"""
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/configuration.hpp"
+#include "absenc/client/decode.hpp"
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/recording.hpp"
+
+using namespace absenc;
+
+int main(int, char** arguments) try {
+  client::Encoder encoder = client::open(arguments[1]);
+  std::printf("%u\n", static_cast<unsigned>(encoder.read().singleturn));
+  client::Encoder elbow = client::open("elbow");
+  client::Recording recording({.path = arguments[2], .encoder = "elbow", .count = 3}, elbow);
+  std::printf("%d\n", recording.run());
+  for (const client::Row& row : client::decode(arguments[3], "tformat")) {
+    std::printf("%s\n", client::to_text(row.values[0]).c_str());
+    break;
+  }
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
+"""
+
+    def run_here(self, *command):
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=5 * PATIENCE,
+                              check=False)
+        self.assert_good(done)
+
+    def test_program_finds_the_library_and_reads(self):
+        root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+        with open(os.path.join(root, "VERSION"), encoding="utf-8") as file:
+            version = file.read().strip()
+        name = f"absenc-{version}-windows-x64-dev"
+        with zipfile.ZipFile(os.path.join(os.path.dirname(os.path.dirname(EXE)), f"{name}.zip")) as archive:
+            archive.extractall(self.directory)
+        self.file("CMakeLists.txt", self.PROJECT.format(version=version))
+        self.file("outside.cpp", self.PROGRAM)
+        self.run_here("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
+                      "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
+                      "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
+        self.run_here("cmake", "--build", self.file("build"))
+        com = self.at_com("--singleturn", "65536")
+        port = re.search(r"COM\d+", com)[0]
+        self.file("absenc.toml", f'[encoder.elbow]\nprotocol = "tformat"\nport = "{port}"\nlatency = 300\n')
+        self.file("wave.vcd", conversation(3).vcd())
+        environment = {name: value for name, value in prefix.environment.items() if name != "ABSENC_CONFIG"}
+        for address, position in (("sim:tformat?singleturn=1234", 1234), (com, 65536)):
+            result = subprocess.run([WINE, self.file("build/outside.exe"), address, self.dos(f"{position}.csv"),
+                                     self.dos("wave.vcd")], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                    env=environment, cwd=self.directory, timeout=PATIENCE, check=False)
+            self.assert_good(result)
+            self.assertEqual(result.stdout.splitlines()[:2], [str(position), "1"])
+            self.assertEqual(len(result.stdout.splitlines()), 3)
+            with open(self.file(f"{position}.csv"), encoding="utf-8") as file:
+                self.assertIn(",65536,", file.read())
 
 
 class Captures(WindowsCase):
     def test_decodes_as_on_linux(self):
-        frames = self.file("Rahmen ä.txt", FRAMES)
-        files = [frames]
-        for ending in ("vcd", "csv"):
-            files.append(self.file(f"Welle ü.{ending}"))
-            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", files[-1], "--count", "20"))
-        for file in files:
+        """Every format but the archives of sigrok: bytes as text, VCD, CSV, raw samples, Saleae's export as a file and as
+        a folder, a log of candump."""
+        wave = conversation(20, bad=(7,))
+        can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
+        frames, vcd, csv, log = (self.file(f"Mitschnitt ä.{ending}") for ending in ("txt", "vcd", "csv", "log"))
+        self.file(os.path.basename(frames), FRAMES)
+        self.file(os.path.basename(vcd), wave.vcd())
+        self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", csv, "--count", "20"))
+        self.assert_good(absenc("read", f"sim:{can}?log={log}", "--count", "5"))
+        samples, saleae, folder = self.file("Werte ü.bin"), self.file("digital_0.bin"), self.file("Export ö")
+        os.mkdir(folder)
+        with open(samples, "wb") as file:
+            file.write(wave.samples("D0", 50))
+        changes = [(at * 1e-9, level) for at, level in wave.changes["D0"]]
+        export = b"<SALEAE>" + struct.pack("<iiIddQ", 0, 0, changes[0][1], 0, changes[-1][0] + 1e-4, len(changes) - 1)
+        export += struct.pack(f"<{len(changes) - 1}d", *(at for at, _ in changes[1:]))
+        for path in (saleae, os.path.join(folder, "digital_0.bin")):
+            with open(path, "wb") as file:
+                file.write(export)
+        for file, protocol, *more in ((frames, "tformat"), (vcd, "tformat"), (csv, "tformat"), (log, can),
+                                      (samples, "tformat", "--raw-channels", "1", "--rate", "20000000"),
+                                      (saleae, "tformat"), (folder, "tformat")):
             with self.subTest(file):
-                there = windows("decode", "tformat", "Z:" + file, "--json")
-                here = absenc("decode", "tformat", file, "--json")
-                self.assertEqual(there.stdout, here.stdout)
+                there = windows("decode", protocol, "Z:" + file, *more, "--json")
+                here = absenc("decode", protocol, file, *more, "--json")
+                self.assertEqual(there.stdout, here.stdout, there.stderr)
                 self.assertEqual(there.returncode, here.returncode)
-                self.assertGreater(len(here.stdout.splitlines()), 1)
+                self.assertGreater(len([line for line in json_lines(here.stdout) if line.get("fields")]), 0, here.stderr)
 
     def test_draws_the_same_waveform(self):
         for ending in ("vcd", "csv"):
