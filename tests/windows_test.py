@@ -8,11 +8,13 @@ import os
 import re
 import select
 import signal
+import struct
 import subprocess
 import threading
 import time
 import tty
 import unittest
+import zipfile
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
@@ -421,30 +423,60 @@ class Commands(WindowsCase):
 
 class Captures(WindowsCase):
     def test_decodes_as_on_linux(self):
-        frames = self.file("Rahmen ä.txt", FRAMES)
-        files = [frames]
-        for ending in ("vcd", "csv"):
-            files.append(self.file(f"Welle ü.{ending}"))
-            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", files[-1], "--count", "20"))
-        for file in files:
+        waves = {ending: self.file(f"Welle ü.{ending}") for ending in ("vcd", "csv", "sr")}
+        for file in waves.values():
+            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", file, "--count", "20"))
+        samples, rate = self.raw_samples(waves["sr"])
+        commands = [["tformat", file] for file in (*waves.values(), self.file("Rahmen ä.txt", FRAMES),
+                                                   self.saleae_export(waves["vcd"]))]
+        commands.append(["tformat", samples, "--raw-channels", "8", "--rate", rate, "--channel", "line=0"])
+        commands.append(["raa38-can", self.file("can ä.log", "(1.000000) can0 121#0102030405060708\n" * 3)])
+        for protocol, file, *options in commands:
             with self.subTest(file):
-                there = windows("decode", "tformat", "Z:" + file, "--json")
-                here = absenc("decode", "tformat", file, "--json")
-                self.assertEqual(there.stdout, here.stdout)
+                there = windows("decode", protocol, "Z:" + file, *options, "--json")
+                here = absenc("decode", protocol, file, *options, "--json")
+                self.assertEqual(there.stdout, here.stdout, there.stderr)
                 self.assertEqual(there.returncode, here.returncode)
-                self.assertGreater(len(here.stdout.splitlines()), 1)
+                self.assertGreater(len(here.stdout.splitlines()), 1, here.stderr)
+
+    def raw_samples(self, session):
+        """Returns the path of a new file with the samples of a session of sigrok, and their rate in Hz."""
+        with zipfile.ZipFile(session) as archive:
+            parts = sorted((name for name in archive.namelist() if name.startswith("logic-1")),
+                           key=lambda name: int(name.rsplit("-", 1)[-1]))
+            content = b"".join(archive.read(name) for name in parts)
+            value, unit = re.search(r"samplerate=(\d+) (\w+)", archive.read("metadata").decode()).groups()
+        path = self.file("Proben ö.bin")
+        with open(path, "wb") as file:
+            file.write(content)
+        return path, str(int(value) * {"Hz": 1, "kHz": 10**3, "MHz": 10**6, "GHz": 10**9}[unit])
+
+    def saleae_export(self, dump):
+        """Returns the path of a new binary export of Saleae with the level changes of a dump of one wire in ns."""
+        with open(dump, encoding="utf-8") as file:
+            changes = re.findall(r"^#(\d+)\n([01])", file.read(), re.MULTILINE)
+        times = [int(at) / 1e9 for at, _ in changes]
+        path = self.file("digital_0 ä.bin")
+        with open(path, "wb") as file:
+            file.write(b"<SALEAE>" + struct.pack("<iiIddQ", 0, 0, int(changes[0][1]), times[0], times[-1],
+                                                 len(times) - 1))
+            file.write(struct.pack(f"<{len(times) - 1}d", *times[1:]))
+        return path
 
     def test_draws_the_same_waveform(self):
-        for ending in ("vcd", "csv"):
+        for ending in ("vcd", "csv", "sr"):
             self.assert_good(windows("wave", "sim:tformat", self.dos(f"dort ü.{ending}")))
             self.assert_good(absenc("wave", "sim:tformat", self.file(f"hier.{ending}")))
             with open(self.file(f"dort ü.{ending}"), "rb") as there, open(self.file(f"hier.{ending}"), "rb") as here:
                 self.assertEqual(there.read(), here.read())
 
-    def test_archives_of_sigrok_are_refused_in_words(self):
-        self.assert_good(absenc("wave", "sim:tformat", self.file("a.sr")))
-        self.assert_failed(windows("decode", "tformat", self.dos("a.sr")), "zip archive", "built without the libraries",
-                           "export VCD or CSV")
+    def test_report_of_doctor_is_read_there_and_here(self):
+        name = "Bericht für Jürgen.zip"
+        self.assert_good(windows("doctor", self.at_com(latency=100), "--report", self.dos(name)))
+        there = windows("decode", self.dos(name))
+        self.assert_good(there)
+        self.assertIn("good: ", there.stdout)
+        self.assertEqual(there.stdout, absenc("decode", self.file(name)).stdout)
 
     def test_standard_input(self):
         there = subprocess.run([WINE, EXE, "decode", "tformat", "-", "--json"], input=FRAMES.encode(),
