@@ -30,6 +30,7 @@ endforeach()
 set(libdeflate_LIBRARIES deflate)
 set(microhttpd_LIBRARIES microhttpd ws2_32)
 set(mosquitto_LIBRARIES mosquitto ws2_32)
+set(absenc_hdf5_libraries hdf5)
 add_compile_definitions(LIBMOSQUITTO_STATIC)
 
 if(ABSENC_TESTS)

@@ -11,11 +11,14 @@ import subprocess
 import sys
 import tempfile
 
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "../.."))
+sys.path.insert(0, os.path.join(ROOT, "tests"))
+from wine_support import WINE, Prefix  # in tests/
+
 HOST = "x86_64-w64-mingw32"
 CC = f"{HOST}-gcc-posix"
 CMAKE = ["cmake", "-G", "Ninja", "-D", "CMAKE_BUILD_TYPE=Release", "-D", "BUILD_SHARED_LIBS=OFF",
-         "-D", "CMAKE_TOOLCHAIN_FILE=" + os.path.abspath(
-             os.path.join(os.path.dirname(__file__), "../../cmake/x86_64-w64-mingw32.cmake"))]
+         "-D", f"CMAKE_TOOLCHAIN_FILE={ROOT}/cmake/x86_64-w64-mingw32.cmake"]
 # Windows 10, as in cmake/windows.cmake; code of other libraries is small rather than fast.
 FLAGS = ["-Os", "-D_WIN32_WINNT=0x0A00"]
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc", "windows")
@@ -88,6 +91,24 @@ def build_mosquitto(source, prefix):  # only the library for clients; without TL
     copy_headers([f"{source}/include/mosquitto.h", f"{source}/include/mqtt_protocol.h"], f"{prefix}/include")
 
 
+def build_hdf5(source, prefix):  # only the library for C; programs that its build runs are for Windows, too
+    build = f"{source}/build"  # these programs write into the folder in which CMake runs
+    os.makedirs(build)
+    with Prefix() as wine:
+        run(*CMAKE, "-S", source, "-B", build, "-D", "CMAKE_C_FLAGS=" + " ".join(FLAGS), "-D",
+            f"CMAKE_CROSSCOMPILING_EMULATOR={WINE}", "-D", "H5_HAVE_UNISTD_H=0",  # where it is, HDF5 wants sys/wait.h
+            "-D", "BUILD_TESTING=OFF",
+            *(word for part in ("TOOLS", "EXAMPLES", "CPP_LIB", "HL_LIB") for word in ("-D", f"HDF5_BUILD_{part}=OFF")),
+            *(word for part in ("Z_LIB", "SZIP") for word in ("-D", f"HDF5_ENABLE_{part}_SUPPORT=OFF")),
+            folder=build, env=wine.environment)
+        run("ninja", "-C", build, "hdf5-static", folder=build, env=wine.environment)
+    os.makedirs(f"{prefix}/lib")
+    shutil.copy(f"{build}/bin/libhdf5.a", f"{prefix}/lib")
+    copy_headers([*glob.glob(f"{source}/src/H5*public.h"), *glob.glob(f"{source}/src/H5FD*.h"), f"{source}/src/hdf5.h",
+                  f"{source}/src/H5version.h", f"{source}/src/H5api_adpt.h", f"{source}/src/H5overflow.h",
+                  *glob.glob(f"{build}/**/H5pubconf.h", recursive=True)], f"{prefix}/include")
+
+
 # Name and version of the source package, and what builds it. A change of either builds it anew.
 LIBRARIES = [
     ("libdeflate", "1.14-1", build_libdeflate),
@@ -95,6 +116,7 @@ LIBRARIES = [
     ("sqlite3", "3.40.1-2+deb12u2", build_sqlite),
     ("libmicrohttpd", "0.9.75-6", build_libmicrohttpd),
     ("mosquitto", "2.0.11-1.2+deb12u2", build_mosquitto),
+    ("hdf5", "1.10.8+repack1-1", build_hdf5),
 ]
 
 
