@@ -17,6 +17,8 @@ import tty
 import unittest
 import zipfile
 
+import h5py
+
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
 from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
@@ -126,8 +128,6 @@ class Basics(WindowsCase):
         self.assertEqual(windows("list", "--json").stdout, absenc("list", "--json").stdout)
 
     def test_parts_that_are_left_out_say_so(self):
-        self.assert_failed(windows("record", "sim:tformat", "--output", self.dos("a.h5"), "--count", "1"),
-                           "writing HDF5 is not in this build", "docs/windows.md")
         self.assert_failed(windows("read", "ssi:spi:/dev/spidev0.0"), "SPI controller", "which Windows does not have")
         can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
         self.assert_failed(windows("read", f"{can}:can0"), "which Windows does not have", "slcan:COM5")
@@ -485,6 +485,45 @@ class Captures(WindowsCase):
                                capture_output=True, env=prefix.environment, timeout=PATIENCE, check=False)
         self.assertEqual(there.stdout.decode(), absenc("decode", "tformat", self.file("frames.txt", FRAMES), "--json").stdout)
         self.assertIn(str(0x12345), there.stdout.decode())
+
+
+class Hdf5(WindowsCase):
+    def read(self, name):
+        """Returns the rows of a recording, times and positions, after a check that they fit a shaft of 60 rpm."""
+        with h5py.File(self.file(name), "r") as file:
+            good = file["event"][:] == b""
+            times, places = file["time_s"][:][good], file["position"][:][good]
+        self.assertEqual(len(times), len(places))
+        for at, place in zip(times, places):
+            self.assertAlmostEqual(place / 2**17 - at, places[0] / 2**17 - times[0], delta=0.045)
+        return times
+
+    def test_recording_is_read_by_another_program(self):
+        name = "Aufnahme für Jürgen.h5"
+        address = self.at_com("--motion", "rpm=60")
+        self.assert_good(windows("record", address, "--output", self.dos(name), "--count", "70", "--rate", "50"))
+        self.assertEqual(len(self.read(name)), 70)
+        with h5py.File(self.file(name), "r") as file:
+            self.assertEqual(file.attrs["protocol"], b"tformat")
+            self.assertEqual(file["angle_deg"].attrs["unit"], b"deg")
+        self.assert_failed(windows("record", address, "--output", self.dos(name), "--count", "1"),
+                           "there is already a file", "für Jürgen")
+
+    def test_recording_is_whole_after_a_kill(self):
+        process = self.begin("record", "sim:tformat?motion=rpm=60", "--output", self.dos("log.h5"), "--rate", "200",
+                             "--count", "0")
+
+        def rows():
+            try:
+                return len(self.read("log.h5"))
+            except (OSError, KeyError, IndexError):  # the file is not there yet, or is changed meanwhile
+                return 0
+
+        wait_until(lambda: rows() > 300, "rows are written")
+        before = rows()
+        process.kill()
+        process.wait()
+        self.assertGreaterEqual(len(self.read("log.h5")), before)
 
 
 SHAFT = "sim:tformat?motion=rpm=60"

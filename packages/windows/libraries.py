@@ -104,9 +104,9 @@ def build_hdf5(source, prefix):  # only the library for C; programs that its bui
         run("ninja", "-C", build, "hdf5-static", folder=build, env=wine.environment)
     os.makedirs(f"{prefix}/lib")
     shutil.copy(f"{build}/bin/libhdf5.a", f"{prefix}/lib")
-    copy_headers([*glob.glob(f"{source}/src/H5*public.h"), *glob.glob(f"{source}/src/H5FD*.h"), f"{source}/src/hdf5.h",
-                  f"{source}/src/H5version.h", f"{source}/src/H5api_adpt.h", f"{source}/src/H5overflow.h",
-                  *glob.glob(f"{build}/**/H5pubconf.h", recursive=True)], f"{prefix}/include")
+    copy_headers([*glob.glob(f"{source}/src/H5*pub*.h"), *glob.glob(f"{source}/src/H5FD*.h"),
+                  *(f"{source}/src/{name}.h" for name in ("hdf5", "H5version", "H5api_adpt", "H5overflow")),
+                  *glob.glob(f"{build}/src/H5*pub*.h")], f"{prefix}/include")
 
 
 # Name and version of the source package, and what builds it. A change of either builds it anew.
