@@ -7,6 +7,7 @@ import json
 import os
 import re
 import select
+import shlex
 import signal
 import sqlite3
 import struct
@@ -21,6 +22,7 @@ import h5py
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
+from monitor_test import Terminal
 from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
 from serve_support import TOKEN, Server, Stream, of, wait_until
 from wine_support import WINE, Prefix
@@ -132,9 +134,6 @@ class Basics(WindowsCase):
         can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
         self.assert_failed(windows("read", f"{can}:can0"), "which Windows does not have", "slcan:COM5")
         self.assert_failed(windows("emulate", "tformat"), "Windows has no pseudo-terminals", "--tcp")
-        lines = windows("monitor", "sim:tformat", "--for", "1.5")
-        self.assert_good(lines)
-        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
 
     def test_output_to_a_full_disk_fails(self):
         with open("/dev/full", "wb") as full:
@@ -527,6 +526,39 @@ class Hdf5(WindowsCase):
 
 
 SHAFT = "sim:tformat?motion=rpm=60"
+
+
+class Console(WindowsCase):
+    """A console of wine, which shows its content on a terminal of tmux."""
+
+    def terminal(self, address):
+        environment = shlex.join(f"{name}={prefix.environment[name]}" for name in
+                                 ("WINEPREFIX", "WINEDEBUG", "WINEDLLOVERRIDES"))
+        return Terminal(self, address, columns=100, rows=30, environment=environment, program=[WINE, EXE])
+
+    def test_screen_of_monitor(self):
+        terminal = self.terminal(self.at_com("--motion", "rpm=60", "--alarm", "over_heat"))
+        first = terminal.wait_for(r"^> tformat:COM\d+\S* +live +\d+\.\d+ (.|\n)*alarms: over_heat")
+        self.assertIn(" q quit  p pause  z zero", first)
+        position = re.search(r"live +(\d+\.\d+)", first)[1]
+        terminal.wait_for(rf"live +(?!{re.escape(position)})\d+\.\d+ ")
+        terminal.press("h")
+        terminal.wait_for("the last bad exchanges, byte by byte")
+        terminal.press("h", "p")
+        terminal.wait_for("paused")
+        terminal.press("q")
+        self.assertEqual(terminal.exit_status(), 0)
+
+    def test_monitor_prints_lines_without_a_console(self):
+        lines = windows("monitor", "sim:tformat", "--for", "1.5")
+        self.assert_good(lines)
+        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
+
+    def test_interrupt_ends_a_command(self):
+        terminal = self.terminal(SHAFT)
+        terminal.wait_for("live")
+        terminal.press("C-c")
+        self.assertEqual(terminal.exit_status(), 0)
 
 
 class Serves(WindowsCase):

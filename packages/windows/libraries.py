@@ -109,6 +109,21 @@ def build_hdf5(source, prefix):  # only the library for C; programs that its bui
                   *glob.glob(f"{build}/src/H5*pub*.h")], f"{prefix}/include")
 
 
+def build_ncurses(source, prefix):  # only the basic library, whose driver calls the functions of Windows' console
+    build = f"{source}/build"
+    os.makedirs(build)
+    run("../configure", f"--host={HOST}", "--build=x86_64-linux-gnu", f"CC={CC}", "CFLAGS=" + " ".join(FLAGS),
+        "--with-build-cc=gcc", "--enable-widec", "--enable-term-driver", "--enable-sp-funcs", "--without-shared",
+        "--with-normal", "--disable-home-terminfo", "--disable-echo",
+        *(f"--without-{part}" for part in ("debug", "ada", "cxx", "cxx-binding", "tests", "progs", "manpages", "dlsym")),
+        folder=build)
+    make("-C", "include", folder=build)
+    make("-C", "ncurses", folder=build)
+    os.makedirs(f"{prefix}/lib")
+    shutil.copy(f"{build}/lib/libncursesw.a", f"{prefix}/lib")
+    copy_headers([f"{build}/include/{name}.h" for name in ("curses", "ncurses_dll", "unctrl")], f"{prefix}/include")
+
+
 # Name and version of the source package, and what builds it. A change of either builds it anew.
 LIBRARIES = [
     ("libdeflate", "1.14-1", build_libdeflate),
@@ -117,6 +132,7 @@ LIBRARIES = [
     ("libmicrohttpd", "0.9.75-6", build_libmicrohttpd),
     ("mosquitto", "2.0.11-1.2+deb12u2", build_mosquitto),
     ("hdf5", "1.10.8+repack1-1", build_hdf5),
+    ("ncurses", "6.4-4", build_ncurses),
 ]
 
 
