@@ -8,7 +8,9 @@ import json
 import os
 import re
 import select
+import shlex
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -18,9 +20,14 @@ import tty
 import unittest
 import zipfile
 
+import h5py
+
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
 from decode_file_test import conversation
+from monitor_test import Terminal
+from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
+from serve_support import TOKEN, Server, Stream, of, wait_until
 from wine_support import WINE, Prefix
 
 EXE = os.path.abspath(os.environ.get("ABSENC_EXE", "build/windows/bin/absenc.exe"))
@@ -126,16 +133,10 @@ class Basics(WindowsCase):
         self.assertEqual(windows("list", "--json").stdout, absenc("list", "--json").stdout)
 
     def test_parts_that_are_left_out_say_so(self):
-        self.assert_failed(windows("serve"), "`absenc serve` is not in this build", "docs/windows.md")
-        self.assert_failed(windows("record", "sim:tformat", "--output", self.dos("a.h5"), "--count", "1"),
-                           "writing HDF5 is not in this build", "docs/windows.md")
         self.assert_failed(windows("read", "ssi:spi:/dev/spidev0.0"), "SPI controller", "which Windows does not have")
         can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
         self.assert_failed(windows("read", f"{can}:can0"), "which Windows does not have", "slcan:COM5")
         self.assert_failed(windows("emulate", "tformat"), "Windows has no pseudo-terminals", "--tcp")
-        lines = windows("monitor", "sim:tformat", "--for", "1.5")
-        self.assert_good(lines)
-        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
 
     def test_output_to_a_full_disk_fails(self):
         with open("/dev/full", "wb") as full:
@@ -653,14 +654,16 @@ int main(int, char** arguments) try {
 
 class Captures(WindowsCase):
     def test_decodes_as_on_linux(self):
-        """Every format but the archives of sigrok: bytes as text, VCD, CSV, raw samples, Saleae's export as a file and as
-        a folder, a log of candump."""
+        """Every format: bytes as text, VCD, CSV, sessions of sigrok, raw samples, Saleae's export as a file and as a
+        folder, a log of candump."""
         wave = conversation(20, bad=(7,))
         can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
-        frames, vcd, csv, log = (self.file(f"Mitschnitt ä.{ending}") for ending in ("txt", "vcd", "csv", "log"))
+        frames, vcd, csv, session, log = (self.file(f"Mitschnitt ä.{ending}")
+                                          for ending in ("txt", "vcd", "csv", "sr", "log"))
         self.file(os.path.basename(frames), FRAMES)
         self.file(os.path.basename(vcd), wave.vcd())
-        self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", csv, "--count", "20"))
+        for file in (csv, session):
+            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", file, "--count", "20"))
         self.assert_good(absenc("read", f"sim:{can}?log={log}", "--count", "5"))
         samples, saleae, folder = self.file("Werte ü.bin"), self.file("digital_0.bin"), self.file("Export ö")
         os.mkdir(folder)
@@ -672,7 +675,7 @@ class Captures(WindowsCase):
         for path in (saleae, os.path.join(folder, "digital_0.bin")):
             with open(path, "wb") as file:
                 file.write(export)
-        for file, protocol, *more in ((frames, "tformat"), (vcd, "tformat"), (csv, "tformat"), (log, can),
+        for file, protocol, *more in ((frames, "tformat"), (vcd, "tformat"), (csv, "tformat"), (session, "tformat"), (log, can),
                                       (samples, "tformat", "--raw-channels", "1", "--rate", "20000000"),
                                       (saleae, "tformat"), (folder, "tformat")):
             with self.subTest(file):
@@ -683,22 +686,242 @@ class Captures(WindowsCase):
                 self.assertGreater(len([line for line in json_lines(here.stdout) if line.get("fields")]), 0, here.stderr)
 
     def test_draws_the_same_waveform(self):
-        for ending in ("vcd", "csv"):
+        for ending in ("vcd", "csv", "sr"):
             self.assert_good(windows("wave", "sim:tformat", self.dos(f"dort ü.{ending}")))
             self.assert_good(absenc("wave", "sim:tformat", self.file(f"hier.{ending}")))
             with open(self.file(f"dort ü.{ending}"), "rb") as there, open(self.file(f"hier.{ending}"), "rb") as here:
                 self.assertEqual(there.read(), here.read())
 
-    def test_archives_of_sigrok_are_refused_in_words(self):
-        self.assert_good(absenc("wave", "sim:tformat", self.file("a.sr")))
-        self.assert_failed(windows("decode", "tformat", self.dos("a.sr")), "zip archive", "built without the libraries",
-                           "export VCD or CSV")
+    def test_report_of_doctor_is_read_there_and_here(self):
+        name = "Bericht für Jürgen.zip"
+        self.assert_good(windows("doctor", self.at_com(latency=100), "--report", self.dos(name)))
+        there = windows("decode", self.dos(name))
+        self.assert_good(there)
+        self.assertIn("good: ", there.stdout)
+        self.assertEqual(there.stdout, absenc("decode", self.file(name)).stdout)
 
     def test_standard_input(self):
         there = subprocess.run([WINE, EXE, "decode", "tformat", "-", "--json"], input=FRAMES.encode(),
                                capture_output=True, env=prefix.environment, timeout=PATIENCE, check=False)
         self.assertEqual(there.stdout.decode(), absenc("decode", "tformat", self.file("frames.txt", FRAMES), "--json").stdout)
         self.assertIn(str(0x12345), there.stdout.decode())
+
+
+class Hdf5(WindowsCase):
+    def read(self, name):
+        """Returns the rows of a recording, times and positions, after a check that they fit a shaft of 60 rpm."""
+        with h5py.File(self.file(name), "r") as file:
+            good = file["event"][:] == b""
+            times, places = file["time_s"][:][good], file["position"][:][good]
+        self.assertEqual(len(times), len(places))
+        for at, place in zip(times, places):
+            self.assertAlmostEqual(place / 2**17 - at, places[0] / 2**17 - times[0], delta=0.045)
+        return times
+
+    def test_recording_is_read_by_another_program(self):
+        name = "Aufnahme für Jürgen.h5"
+        address = self.at_com("--motion", "rpm=60")
+        self.assert_good(windows("record", address, "--output", self.dos(name), "--count", "70", "--rate", "50"))
+        self.assertEqual(len(self.read(name)), 70)
+        with h5py.File(self.file(name), "r") as file:
+            self.assertEqual(file.attrs["protocol"], b"tformat")
+            self.assertEqual(file["angle_deg"].attrs["unit"], b"deg")
+        self.assert_failed(windows("record", address, "--output", self.dos(name), "--count", "1"),
+                           "there is already a file", "für Jürgen")
+
+    def test_recording_is_whole_after_a_kill(self):
+        process = self.begin("record", "sim:tformat?motion=rpm=60", "--output", self.dos("log.h5"), "--rate", "200",
+                             "--count", "0")
+
+        def rows():
+            try:
+                return len(self.read("log.h5"))
+            except (OSError, KeyError, IndexError):  # the file is not there yet, or is changed meanwhile
+                return 0
+
+        wait_until(lambda: rows() > 300, "rows are written")
+        before = rows()
+        process.kill()
+        process.wait()
+        self.assertGreaterEqual(len(self.read("log.h5")), before)
+
+
+SHAFT = "sim:tformat?motion=rpm=60"
+
+
+class Console(WindowsCase):
+    """A console of wine, which shows its content on a terminal of tmux."""
+
+    def terminal(self, address):
+        environment = shlex.join(f"{name}={prefix.environment[name]}" for name in
+                                 ("WINEPREFIX", "WINEDEBUG", "WINEDLLOVERRIDES"))
+        return Terminal(self, address, columns=100, rows=30, environment=environment, program=[WINE, EXE])
+
+    def test_screen_of_monitor(self):
+        terminal = self.terminal(self.at_com("--motion", "rpm=60", "--alarm", "over_heat"))
+        first = terminal.wait_for(r"^> tformat:COM\d+\S* +live +\d+\.\d+ (.|\n)*alarms: over_heat")
+        self.assertIn(" q quit  p pause  z zero", first)
+        position = re.search(r"live +(\d+\.\d+)", first)[1]
+        terminal.wait_for(rf"live +(?!{re.escape(position)})\d+\.\d+ ")
+        terminal.press("h")
+        terminal.wait_for("the last bad exchanges, byte by byte")
+        terminal.press("h", "p")
+        terminal.wait_for("paused")
+        terminal.press("q")
+        self.assertEqual(terminal.exit_status(), 0)
+
+    def test_monitor_prints_lines_without_a_console(self):
+        lines = windows("monitor", "sim:tformat", "--for", "1.5")
+        self.assert_good(lines)
+        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
+
+    def test_interrupt_ends_a_command(self):
+        terminal = self.terminal(SHAFT)
+        terminal.wait_for("live")
+        terminal.press("C-c")
+        self.assertEqual(terminal.exit_status(), 0)
+
+
+class Serves(WindowsCase):
+    def server(self, *arguments):
+        server = Server(*arguments, within=[WINE], program=EXE, **prefix.environment)
+        self.addCleanup(lambda: end(server.process) if server.process.poll() is None else None)
+        return server
+
+    @staticmethod
+    def seconds(server):
+        """Returns the times of all seconds in the history of the encoder; none while a damaged one is replaced."""
+        now = int(time.time())
+        status, text = server.ask(of(SHAFT, "history"), **{"from": now - 600, "to": now, "rows": 1000})
+        return [row[0] for row in json.loads(text)["rows"]] if status == 200 else []
+
+    def test_api_events_and_ctrl_c(self):
+        server = self.server(SHAFT, "--history", "none")
+        self.assertEqual(server.url, f"http://127.0.0.1:{server.port}/")
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        stream = Stream(server, SHAFT)
+        self.addCleanup(stream.close)
+        places = [stream.next() for _ in range(5)]
+        self.assertEqual(len(places), 5)
+        self.assertIn("absenc_readings_total", server.ask("/metrics")[1])
+        status, _, messages = end(server.process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("Ctrl-C ends\n", messages)
+
+    def test_reads_encoders_at_com_ports(self):
+        address = self.at_com("--singleturn", "65536")
+        server = self.server(address, "--history", "none")
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        busy = self.server(SHAFT, "--history", "none")
+        taken = windows("serve", SHAFT, "--history", "none", "--listen", f"127.0.0.1:{busy.port}")
+        self.assert_failed(taken, "is in use by another program")
+
+    def test_page_in_a_browser(self):
+        from page_scenes import Browser  # is here, because only this test needs selenium
+        server = self.server(SHAFT, self.at_com("--singleturn", "65536"), "--history", self.dos("Seite ü.sqlite"))
+        browser = Browser()
+        self.addCleanup(browser.driver.quit)
+        browser.go(server.url)
+        wait_until(lambda: "tformat" in browser.ask("return document.body.innerText"), "the page names the encoders")
+        shown = "return [...document.querySelectorAll('.card')].map((card) => card.innerText)"
+        first = wait_until(lambda: len(browser.ask(shown)) == 2 and browser.ask(shown), "the page has both encoders")
+        wait_until(lambda: browser.ask(shown)[0] != first[0], "the angle of the shaft changes on the page")
+        wait_until(lambda: "180.0" in browser.ask(shown)[1], "the page shows the encoder at the COM port")
+        problems = [line for line in browser.driver.get_log("browser") if line["level"] == "SEVERE"]
+        self.assertEqual(problems, [])
+
+    def test_history_is_whole_after_a_kill(self):
+        path = self.file("Verlauf für Jürgen.sqlite")
+        arguments = [SHAFT, "--history", self.dos(os.path.basename(path))]
+        server = self.server(*arguments)
+        before = wait_until(lambda: len(rows := self.seconds(server)) >= 4 and rows, "four seconds are written")
+        self.assertEqual(before, list(range(before[0], before[-1] + 1)))
+        second = windows("serve", *arguments, "--listen", "127.0.0.1:0")
+        self.assert_failed(second, "another server keeps its history in")
+        server.process.kill()
+        server.process.wait()
+        again = self.server(*arguments)
+        after = wait_until(lambda: (rows := self.seconds(again))[-1:] > before[-1:] and rows, "the history goes on")
+        self.assertEqual(after[:len(before)], before)
+        self.assertEqual(end(again.process, signal.SIGINT)[0], 0)
+        with sqlite3.connect(path) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+            written = [at for at, in database.execute("SELECT at FROM second ORDER BY at")]
+        self.assertEqual(written[:len(before)], before)
+
+    def test_damaged_history_is_set_aside(self):
+        path = self.file("history.sqlite")
+        server = self.server(SHAFT, "--history", self.dos("history.sqlite"))
+        wait_until(lambda: self.seconds(server), "a second is written")
+        with open(path, "r+b") as file:
+            file.write(b"no database" * 1000)
+        wait_until(lambda: any(".damaged-" in name for name in os.listdir(self.directory)), "the file is renamed")
+        wait_until(lambda: self.seconds(server), "a new history begins")
+        events = wait_until(lambda: server.json("/api/events")["events"], "the new history has an event")
+        self.assertIn("a new one begins", json.dumps(events))
+
+    def test_usual_history_is_in_the_local_folder_of_the_user(self):
+        environment = {name: value for name, value in prefix.environment.items()
+                       if name not in ("STATE_DIRECTORY", "XDG_STATE_HOME")}
+        server = Server(SHAFT, within=[WINE], program=EXE, **environment)
+        self.addCleanup(end, server.process)
+        wait_until(lambda: self.seconds(server), "a second is written")
+        self.assertTrue(os.path.exists(os.path.join(prefix.user_folder("Local"), "absenc", "history.sqlite")))
+
+    def test_tokens_that_others_may_read_are_refused(self):
+        path = self.file("Schlüssel.txt", f"anna {TOKEN}\n")
+        address = self.at_com()
+        arguments = [address, "--history", "none", "--token-file", self.dos("Schlüssel.txt")]
+        os.chmod(path, 0o644)
+        self.assert_failed(windows("serve", *arguments, "--listen", "127.0.0.1:0"), "others may read", "icacls")
+        os.chmod(path, 0o600)
+        server = self.server(*arguments)
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        self.assertEqual(server.command(address, "clear-alarms", {})[0], 401)
+        status, answer = server.command(address, "clear-alarms", {"Authorization": f"Bearer {TOKEN}"})
+        self.assertEqual(status, 200, answer)
+
+    def sender(self, url):
+        return self.server(SHAFT, "--history", "none", "--rate", "50", "--mqtt", url, "--mqtt-prefix", "plant/hall",
+                           "--mqtt-spool", self.dos("Warteschlange ü"))
+
+    @staticmethod
+    def taken(server):
+        """Returns the number of readings that the server has taken for MQTT."""
+        return server.json("/api/mqtt")["taken"].get(SHAFT, 0)
+
+    def test_readings_wait_for_the_broker_and_survive_a_kill(self):
+        server = self.sender(f"mqtt://127.0.0.1:{free_port()}")
+        wait_until(lambda: self.taken(server) > 100, "readings wait in the spool")
+        taken = self.taken(server)
+        server.process.kill()
+        server.process.wait()
+        broker = Broker(self.directory)
+        self.addCleanup(broker.end)
+        receiver = Receiver(broker.port, client_id="keeps")
+        self.addCleanup(receiver.end)
+        found = lambda: numbers_of(receiver.all("readings"), SHAFT)
+        server = self.sender(broker.url)
+        goal = wait_until(lambda: (now := self.taken(server)) > taken and now, "it goes on")
+        wait_until(lambda: found()[-1:] >= [goal], "all readings arrive")
+        self.assertEqual(found(), list(range(1, len(found()) + 1)))
+        broker.kill()
+        before = self.taken(server)
+        wait_until(lambda: self.taken(server) > before + 100, "two seconds wait in the spool")
+        broker.start()
+        goal = self.taken(server)
+        wait_until(lambda: found()[-1] >= goal, "readings arrive again")
+        wait_until(lambda: server.json("/api/mqtt")["waiting"] < 5, "the spool is sent")
+        self.assertEqual(server.json("/api/mqtt")["dropped"], 0)
+        second = windows("serve", SHAFT, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt", broker.url,
+                         "--mqtt-spool", self.dos("Warteschlange ü"))
+        self.assert_failed(second, "is locked: another process keeps it")
+        self.assertEqual(end(server.process, signal.SIGINT)[0], 0)
+
+    def test_mqtt_over_tls_is_refused_in_words(self):
+        result = windows("serve", SHAFT, "--history", "none", "--mqtt", "mqtts://127.0.0.1:1", "--mqtt-spool",
+                         self.dos("spool"), "--listen", "127.0.0.1:0")
+        self.assert_failed(result, "needs TLS, which is not in this build")
 
 
 if __name__ == "__main__":

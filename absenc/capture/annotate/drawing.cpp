@@ -253,7 +253,7 @@ void write_saleae_csv(std::ostream& out, Drawing& drawing) {
   }
 }
 
-void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate) {
+void write_sigrok(const std::filesystem::path& path, Drawing& drawing, std::uint64_t rate) {
   ZipWriter archive(path);
   Samples samples(drawing, rate);
   archive.add("version", "2");
