@@ -17,7 +17,7 @@ add_library(nlohmann_json::nlohmann_json ALIAS absenc-foreign-headers)
 
 # Windows 10; without names that collide with ours; with M_PI.
 add_compile_definitions(_WIN32_WINNT=0x0A00 WIN32_LEAN_AND_MEAN NOMINMAX _USE_MATH_DEFINES FMT_HEADER_ONLY=1)
-set(absenc_windows_libraries ws2_32 setupapi)
+set(absenc_system_libraries ws2_32 setupapi)
 
 # Libraries without a mingw package in Debian, each in a folder (packages/windows/libraries.py). Only what includes their
 # headers links this target, so that a new version of one of them does not compile everything anew.

@@ -10,6 +10,7 @@ import re
 import select
 import shlex
 import signal
+import socket
 import sqlite3
 import struct
 import subprocess
@@ -785,8 +786,15 @@ class Console(WindowsCase):
 class Serves(WindowsCase):
     def server(self, *arguments):
         server = Server(*arguments, within=[WINE], program=EXE, **prefix.environment)
-        self.addCleanup(lambda: end(server.process) if server.process.poll() is None else None)
+        self.addCleanup(self.finish, server.process)
         return server
+
+    @staticmethod
+    def finish(process):
+        if process.poll() is None:
+            end(process)
+        for stream in (process.stdout, process.stderr):
+            stream.close()
 
     @staticmethod
     def seconds(server):
@@ -880,6 +888,39 @@ class Serves(WindowsCase):
         self.assertEqual(server.command(address, "clear-alarms", {})[0], 401)
         status, answer = server.command(address, "clear-alarms", {"Authorization": f"Bearer {TOKEN}"})
         self.assertEqual(status, 200, answer)
+
+    @staticmethod
+    def mqtt_processes():
+        """Returns the process numbers of the MQTT clients that servers in this prefix have started."""
+        found = []
+        for number in filter(str.isdigit, os.listdir("/proc")):
+            with contextlib.suppress(OSError):  # the process has ended, or belongs to others
+                with open(f"/proc/{number}/cmdline", "rb") as words, open(f"/proc/{number}/environ", "rb") as values:
+                    if b"serve-mqtt-client" in words.read() and prefix.folder.encode() in values.read():
+                        found.append(int(number))
+        return found
+
+    def test_mqtt_client_that_dies_is_started_again_and_ends_with_the_server(self):
+        broker = Broker(self.directory)
+        self.addCleanup(broker.end)
+        server = self.sender(broker.url)
+        mqtt = lambda: server.json("/api/mqtt")
+        wait_until(lambda: mqtt()["connected"], "the broker is connected")
+        [client] = self.mqtt_processes()
+        os.kill(client, signal.SIGKILL)
+        wait_until(lambda: mqtt()["client_deaths"] == 1 and mqtt()["connected"], "another client is connected")
+        self.assertEqual(len(self.mqtt_processes()), 1)
+        server.process.kill()
+        server.process.wait()
+        wait_until(lambda: not self.mqtt_processes(), "the client has ended")
+
+    def test_udp(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+            receiver.bind(("127.0.0.1", 0))
+            receiver.settimeout(PATIENCE)
+            self.server(SHAFT, "--history", "none", "--udp", f"127.0.0.1:{receiver.getsockname()[1]}")
+            sent = [json.loads(receiver.recv(4096)) for _ in range(10)]
+        self.assertTrue(all(SHAFT in one and one["timestamp"] > 1e9 for one in sent), sent)
 
     def sender(self, url):
         return self.server(SHAFT, "--history", "none", "--rate", "50", "--mqtt", url, "--mqtt-prefix", "plant/hall",

@@ -156,7 +156,7 @@ def ask_apt(folder):
     with open(os.path.join(folder, "apt.conf"), "w", encoding="utf-8") as file:
         file.write(f'Dir::Etc::sourcelist "{folder}/sources.list";\nDir::Etc::sourceparts "/dev/null";\n'
                    f'Dir::State::lists "{folder}/lists";\nDir::Cache "{folder}/cache";\nAPT::Sandbox::User "";\n'
-                   "#clear APT::Update;\n#clear Acquire::IndexTargets::deb-src::DEP-11;\n")
+                   "#clear APT::Update;\n")
     apt = ["apt-get", "-q", "-c", f"{folder}/apt.conf"]
     run(*apt, "update", folder=folder)
     return apt

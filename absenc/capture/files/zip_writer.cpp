@@ -16,7 +16,7 @@ namespace absenc::capture {
 
 namespace {
 
-std::ios::seekdir direction_of(int origin) {
+std::ios::seekdir seek_direction(int origin) {
   if (origin == ZLIB_FILEFUNC_SEEK_SET) return std::ios::beg;
   return origin == ZLIB_FILEFUNC_SEEK_CUR ? std::ios::cur : std::ios::end;
 }
@@ -43,7 +43,7 @@ zlib_filefunc64_def file_functions() {
   };
   all.zseek64_file = [](void*, void* file, ZPOS64_T offset, int origin) {
     const std::streamoff place =
-        static_cast<std::filebuf*>(file)->pubseekoff(static_cast<std::streamoff>(offset), direction_of(origin));
+        static_cast<std::filebuf*>(file)->pubseekoff(static_cast<std::streamoff>(offset), seek_direction(origin));
     return place < 0 ? -1L : 0L;
   };
   all.zclose_file = [](void*, void* file) {

@@ -35,8 +35,8 @@ class Child final : public Waitable {
   Handle job_;
 };
 
-struct Ends {
-  Ends() {
+struct PipeEnds {
+  PipeEnds() {
     static std::atomic<unsigned> count{0};
     const std::wstring name =
         LR"(\\.\pipe\absenc-)" + std::to_wstring(::GetCurrentProcessId()) + L"-" + std::to_wstring(++count);
@@ -57,7 +57,7 @@ struct Ends {
 /// What a process gets when it starts: its standard streams, which are all that it inherits.
 class Startup {
  public:
-  explicit Startup(const Ends& ends) : inherited_{ends.other.get(), ends.nowhere.get()} {
+  explicit Startup(const PipeEnds& ends) : inherited_{ends.other.get(), ends.nowhere.get()} {
     SIZE_T size = 0;
     ::InitializeProcThreadAttributeList(nullptr, 1, 0, &size);
     storage_.resize(size);
@@ -126,7 +126,7 @@ ChildProcess::ChildProcess(std::vector<std::string> arguments) : channel_(Descri
   if (::GetModuleFileNameW(nullptr, program.data(), static_cast<DWORD>(program.size())) == 0) throw failure();
   std::wstring command;
   for (const std::string& one : arguments) command += (command.empty() ? L"\"" : L" \"") + utf16(one) + L"\"";
-  Ends ends;
+  PipeEnds ends;
   Startup startup(ends);
   PROCESS_INFORMATION made{};
   // Without a console the child gets no Ctrl-C: the parent still needs it then.
