@@ -16,7 +16,7 @@ set(absenc_long_python_tests
     # these tests inject many faults, load the machine, or repeat exchanges on every line
     doctor_faults doctor_healthy identify speed
     # these tests compile, install or configure the project
-    docs install mutants_script new_protocol packages python_wheel
+    docs install mutants_script new_protocol packages python_wheel windows_library
     python python_units record_hdf5  # these tests need mypy, pytest, pandas, matplotlib and h5py
     # these tests need MQTT brokers, HTTP proxies and full disks
     serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool
