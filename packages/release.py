@@ -22,9 +22,9 @@ import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from architectures import PUBLISHED, ROOT, TREES, build_tree, run, say
+
 VERSION = (ROOT / "VERSION").read_text().strip()
-TREES = ROOT / "build/release-trees"
 sys.path.insert(0, str(ROOT / "packages/arduino"))
 sys.path.insert(0, str(ROOT / "python/backend"))
 
@@ -49,40 +49,8 @@ HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-de
 STATIC = ["libstdc++-12-dev", "zlib1g-dev", "libminizip-dev", "libdeflate-dev", "libgpiod-dev"]
 
 
-@dataclass
-class Architecture:
-    """A machine for which programs are built, by Debian's name."""
-    name: str
-    tuple: str  # prefix of the names of the compiler and its tools
-    processor: str
-    emulator: str
-
-    @property
-    def native(self):
-        return self.processor == os.uname().machine
-
-
-ARCHITECTURES = {one.name: one for one in (
-    Architecture("amd64", "x86_64-linux-gnu", "x86_64", "qemu-x86_64-static"),
-    Architecture("arm64", "aarch64-linux-gnu", "aarch64", "qemu-aarch64-static"),
-    Architecture("armhf", "arm-linux-gnueabihf", "armv7l", "qemu-arm-static"),
-)}
-# The packages whose headers and libraries a cross-compiler needs.
-SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
-    libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
-    libmosquitto-dev libpython3.11-dev pybind11-dev libjs-dygraphs""".split()
-
-
-def run(*command, **settings):
-    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, **settings)
-    if done.returncode != 0:
-        sys.exit(f"release: {' '.join(map(str, command))} failed:\n{done.stdout[-6000:]}")
-    return done.stdout
-
-
-def say(text):
-    print(f"release: {text}", flush=True)
+# Options of a build tree for packages; they switch off what a test may have switched on there.
+PACKAGES = ["-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF"]
 
 
 @dataclass
@@ -121,30 +89,12 @@ class Release:
 
     # --- building ---
 
-    def tree(self, architecture, kind, *options):
-        """Configures a build tree and returns its path."""
-        # this build tree is as deep in the folders as all others, so that a compiler cache sees the same relative paths
-        path = ROOT / f"build/tree-{architecture.name}-{kind}"
-        options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG", "-DCMAKE_INSTALL_PREFIX=/usr",
-                   "-DABSENC_WERROR=ON", "-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF", "-DPython3_EXECUTABLE=/usr/bin/python3", *options]
-        if not architecture.native:
-            root = sysroot(architecture)
-            options += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/cross.cmake", f"-DABSENC_CROSS_TUPLE={architecture.tuple}",
-                        f"-DABSENC_CROSS_PROCESSOR={architecture.processor}", f"-DABSENC_CROSS_ROOT={root}",
-                        f"-DABSENC_CROSS_EMULATOR={architecture.emulator}",
-                        f"-DPython3_INCLUDE_DIR={root}/usr/include/python3.11",
-                        f"-DPYTHON_MODULE_EXTENSION=.cpython-311-{architecture.tuple}.so",
-                        f"-DHDF5_C_LIBRARIES={root}/usr/lib/{architecture.tuple}/libhdf5_serial.so",
-                        f"-DHDF5_C_INCLUDE_DIRS={root}/usr/include/hdf5/serial"]
-        run("cmake", "-S", ROOT, "-B", path, "-G", "Ninja", *options)
-        return path
-
     def build(self, tree, *targets):
         run("cmake", "--build", tree, "-j", self.jobs, "--target", *targets)
 
     def debian_packages(self, architecture):
         say(f"Debian packages for {architecture.name}")
-        tree = self.tree(architecture, "packages", f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
+        tree = build_tree(architecture, "packages", *PACKAGES, f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
         self.build(tree, "all")
         with tempfile.TemporaryDirectory() as scratch:
             run("cpack", "--config", tree / "CPackConfig.cmake", "-B", scratch)
@@ -155,7 +105,7 @@ class Release:
 
     def static_artefacts(self, architecture):
         say(f"the tarball and the wheel for {architecture.name}")
-        tree = self.tree(architecture, "static", "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
+        tree = build_tree(architecture, "static", *PACKAGES, "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
                          "-DABSENC_FTDI=OFF", "-DABSENC_HDF5=OFF")  # Debian has no static libudev, which libusb needs
         self.build(tree, "absenc-command", "absenc-manual", "absenc-python")
         self.tarball(architecture, tree)
@@ -320,32 +270,10 @@ def identifier(name):
     return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", name)
 
 
-def sysroot(architecture):
-    """Returns a folder with Debian 12's headers and libraries for this architecture; makes it once."""
-    root = TREES / f"sysroot-{architecture.name}"
-    if not (root / "complete").is_file():
-        say(f"Debian's headers and libraries for {architecture.name}")
-        shutil.rmtree(root, ignore_errors=True)
-        run("mmdebstrap", "--variant=extract", f"--architectures={architecture.name}", f"--include={','.join(SYSROOT_PACKAGES)}",
-            "bookworm", root)
-        relative_links(root)
-        (root / "complete").touch()
-    return root
-
-
-def relative_links(root):
-    """Makes absolute links in a root relative, so that a cross-compiler does not follow them into this computer."""
-    for path in root.rglob("*"):
-        if path.is_symlink() and os.readlink(path).startswith("/"):
-            target = root / os.readlink(path)[1:]
-            path.unlink()
-            path.symlink_to(os.path.relpath(target, path.parent))
-
-
 def main():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--only", default=",".join(ARCHITECTURES))
+    parser.add_argument("--only", default=",".join(PUBLISHED))
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     chosen = parser.parse_args()
     changed = run("git", "-C", ROOT, "status", "--porcelain")
@@ -362,8 +290,8 @@ def main():
     release = Release(output, chosen.jobs, run("git", "-C", ROOT, "rev-parse", "--short=12", "HEAD").strip(), epoch)
     release.sources()
     for name in chosen.only.split(","):
-        release.debian_packages(ARCHITECTURES[name])
-        release.static_artefacts(ARCHITECTURES[name])
+        release.debian_packages(PUBLISHED[name])
+        release.static_artefacts(PUBLISHED[name])
     release.lists()
     say(f"{len(release.inside)} artefacts are in {output}")
 
