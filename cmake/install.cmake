@@ -39,7 +39,7 @@ if(TARGET absenc-client)
   absenc_pkgconfig(absenc-configuration "Names of absenc.toml for absenc-client" "absenc-client ${same}"
                    absenc-configuration)
   absenc_pkgconfig(absenc-captures "Captures of logic analysers, decoded" "absenc-client ${same}" absenc-captures
-                   absenc-capture minizip z ${libdeflate_LIBRARIES} ${hwy_LIBRARIES})
+                   absenc-capture minizip z ${libdeflate_LIBRARIES})
   absenc_pkgconfig(absenc-recording "Recordings of encoders as CSV and JSON lines" "absenc-client ${same}"
                    absenc-recording)
 endif()

@@ -52,13 +52,15 @@ class Architecture:
         if self.native:
             return []
         root = self.sysroot()
+        # h5cc of this computer would name its own headers and libraries
         return [f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/cross.cmake", f"-DABSENC_CROSS_TUPLE={self.tuple}",
                 f"-DABSENC_CROSS_PROCESSOR={self.processor}", f"-DABSENC_CROSS_ROOT={root}",
                 f"-DABSENC_CROSS_EMULATOR={self.emulator}",
                 f"-DPython3_INCLUDE_DIR={root}/usr/include/python3.11",
                 f"-DPYTHON_MODULE_EXTENSION=.cpython-311-{self.tuple}.so",
-                f"-DHDF5_C_LIBRARIES={root}/usr/lib/{self.tuple}/libhdf5_serial.so",
-                f"-DHDF5_C_INCLUDE_DIRS={root}/usr/include/hdf5/serial"]
+                "-DHDF5_C_COMPILER_EXECUTABLE=false",
+                f"-DHDF5_C_LIBRARY_hdf5={root}/usr/lib/{self.tuple}/libhdf5_serial.so",
+                f"-DHDF5_C_INCLUDE_DIR={root}/usr/include/hdf5/serial"]
 
 
 PUBLISHED = {one.name: one for one in (
