@@ -43,7 +43,7 @@ if(TARGET absenc-client)
     set(zip_libraries minizip z ${libdeflate_LIBRARIES})
   endif()
   absenc_pkgconfig(absenc-captures "Captures of logic analysers, decoded" "absenc-client ${same}" absenc-captures
-                   absenc-capture ${zip_libraries} ${hwy_LIBRARIES})
+                   absenc-capture ${zip_libraries})
   absenc_pkgconfig(absenc-recording "Recordings of encoders as CSV and JSON lines" "absenc-client ${same}"
                    absenc-recording)
 endif()

@@ -84,13 +84,17 @@ function(absenc_test name)
   endif()
   # the folder of the sources, for tests that compare tables in documents with the code
   set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
-  if(WIN32)  # one start of wine for each program, because its start takes longer than most tests
-    add_test(NAME ${name} COMMAND ${name}_test --gtest_brief=1)
+  set(long "${absenc_long_${name}_tests}")
+  if(CMAKE_CROSSCOMPILING)  # few starts of wine or qemu, because their start takes longer than most tests
+    add_test(NAME ${name} COMMAND ${name}_test --gtest_brief=1 "--gtest_filter=-${long}")
     set_tests_properties(${name} PROPERTIES ENVIRONMENT "${environment}")
+    if(long)
+      add_test(NAME ${name}_long COMMAND ${name}_test --gtest_brief=1 "--gtest_filter=${long}")
+      set_tests_properties(${name}_long PROPERTIES ENVIRONMENT "${environment}" LABELS long)
+    endif()
     return()
   endif()
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
-  set(long "${absenc_long_${name}_tests}")
   if(long)
     gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${name}_long_tests
                          PROPERTIES ENVIRONMENT "${environment}" LABELS long)
@@ -255,6 +259,13 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS AND NOT WIN32)
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
+  set(tested_command "${absenc_bin_dir}/absenc")
+  if(CMAKE_CROSSCOMPILING)  # a script that runs the command in the emulator
+    set(tested_command "${CMAKE_CURRENT_BINARY_DIR}/emulated/absenc")
+    list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
+    file(CONFIGURE OUTPUT "${tested_command}" CONTENT "#!/bin/sh\nexec ${emulator} ${absenc_bin_dir}/absenc \"$@\"\n" @ONLY)
+    file(CHMOD "${tested_command}" FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
+  endif()
   file(GLOB abuse_lists CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/abuse/*_abuse.py")
   foreach(source IN LISTS python_tests abuse_lists)
     cmake_path(GET source STEM stem)
@@ -262,7 +273,7 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS AND NOT WIN32)
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
       # ABSENC_BUSY_SECONDS relaxes time limits, because other tests run at the same time.
-      ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
+      ENVIRONMENT "ABSENC=${tested_command};ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
       COST 100  # Python tests start first, because they mostly wait and leave the processor to others
       TIMEOUT 900)  # time limit in seconds, long enough for a busy machine
     if(name IN_LIST absenc_long_python_tests)

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: release.py OUTPUT [--only amd64,arm64,armhf] [--jobs N]
+"""usage: release.py OUTPUT [--only amd64,arm64,armhf,windows] [--jobs N]
 
 Builds everything that is published into the folder OUTPUT, which must not exist: Debian packages, static tarballs, wheels,
-the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/tree-*.
+archives for Windows, the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/tree-*.
 The same commit gives the same bits: nothing in an artefact depends on folder, user or time.
 """
 import argparse
-import gzip
 import hashlib
 import io
 import json
@@ -18,14 +17,15 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from archives import write_tar, write_zip
+from architectures import PUBLISHED, ROOT, TREES, build_tree, run, say
+
 VERSION = (ROOT / "VERSION").read_text().strip()
-TREES = ROOT / "build/release-trees"
 sys.path.insert(0, str(ROOT / "packages/arduino"))
+sys.path.insert(0, str(ROOT / "packages/windows"))
 sys.path.insert(0, str(ROOT / "python/backend"))
 
 # Licences of what is inside an artefact, by the Debian package that it comes from.
@@ -43,46 +43,25 @@ LICENCES = {
     "libhwy-dev": "Apache-2.0",
     "pybind11-dev": "BSD-3-Clause",
     "libjs-dygraphs": "MIT",
+    "gcc-mingw-w64-base": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "mingw-w64-x86-64-dev": "ZPL-2.1",
+    "libz-mingw-w64-dev": "Zlib",
+    # source packages, from which packages/windows/libraries.py builds
+    "libdeflate": "MIT",
+    "minizip": "Zlib",
+    "sqlite3": "blessing",
+    "libmicrohttpd": "LGPL-2.1-or-later",
+    "mosquitto": "EPL-2.0 OR BSD-3-Clause",
+    "hdf5": "BSD-3-Clause",
+    "ncurses": "X11-distribute-modifications-variant",
 }
 # Packages whose headers contain code that is compiled into the command absenc on every architecture.
 HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev"]
 STATIC = ["libstdc++-12-dev", "zlib1g-dev", "libminizip-dev", "libdeflate-dev", "libgpiod-dev"]
 
 
-@dataclass
-class Architecture:
-    """A machine for which programs are built, by Debian's name."""
-    name: str
-    tuple: str  # prefix of the names of the compiler and its tools
-    processor: str
-    emulator: str
-
-    @property
-    def native(self):
-        return self.processor == os.uname().machine
-
-
-ARCHITECTURES = {one.name: one for one in (
-    Architecture("amd64", "x86_64-linux-gnu", "x86_64", "qemu-x86_64-static"),
-    Architecture("arm64", "aarch64-linux-gnu", "aarch64", "qemu-aarch64-static"),
-    Architecture("armhf", "arm-linux-gnueabihf", "armv7l", "qemu-arm-static"),
-)}
-# The packages whose headers and libraries a cross-compiler needs.
-SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
-    libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
-    libmosquitto-dev libpython3.11-dev pybind11-dev libjs-dygraphs""".split()
-
-
-def run(*command, **settings):
-    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, **settings)
-    if done.returncode != 0:
-        sys.exit(f"release: {' '.join(map(str, command))} failed:\n{done.stdout[-6000:]}")
-    return done.stdout
-
-
-def say(text):
-    print(f"release: {text}", flush=True)
+# Options of a build tree for packages; they switch off what a test may have switched on there.
+PACKAGES = ["-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF"]
 
 
 @dataclass
@@ -92,59 +71,20 @@ class Release:
     commit: str
     epoch: int
     inside: dict = field(default_factory=dict)  # for each artefact, the Debian packages whose code it contains
+    sources_of: dict = field(default_factory=dict)  # for each source package in them, its version and its licence's file
 
     def publish(self, path, packages=()):
         shutil.copyfile(path, self.output / path.name)
         self.inside[path.name] = list(packages)
 
-    # --- archives whose bits depend on nothing but their content ---
-
-    def write_tar(self, path, files):
-        """Writes {name: (bytes, mode)} as a .tar.gz."""
-        plain = io.BytesIO()
-        with tarfile.open(fileobj=plain, mode="w", format=tarfile.PAX_FORMAT) as archive:
-            for name in sorted(files):
-                content, mode = files[name]
-                info = tarfile.TarInfo(name)
-                info.size, info.mode, info.mtime = len(content), mode, self.epoch
-                archive.addfile(info, io.BytesIO(content))
-        path.write_bytes(gzip.compress(plain.getvalue(), 9, mtime=0))
-
-    def write_zip(self, path, files):
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name in sorted(files):
-                content, mode = files[name]
-                info = zipfile.ZipInfo(name)  # without a given date, ZipInfo dates each file 1980-01-01
-                info.external_attr = (0o100000 | mode) << 16
-                info.compress_type = zipfile.ZIP_DEFLATED
-                archive.writestr(info, content)
-
     # --- building ---
-
-    def tree(self, architecture, kind, *options):
-        """Configures a build tree and returns its path."""
-        # this build tree is as deep in the folders as all others, so that a compiler cache sees the same relative paths
-        path = ROOT / f"build/tree-{architecture.name}-{kind}"
-        options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG", "-DCMAKE_INSTALL_PREFIX=/usr",
-                   "-DABSENC_WERROR=ON", "-DABSENC_PYTHON=ON", "-DABSENC_TESTS=OFF", "-DPython3_EXECUTABLE=/usr/bin/python3", *options]
-        if not architecture.native:
-            root = sysroot(architecture)
-            options += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/cross.cmake", f"-DABSENC_CROSS_TUPLE={architecture.tuple}",
-                        f"-DABSENC_CROSS_PROCESSOR={architecture.processor}", f"-DABSENC_CROSS_ROOT={root}",
-                        f"-DABSENC_CROSS_EMULATOR={architecture.emulator}",
-                        f"-DPython3_INCLUDE_DIR={root}/usr/include/python3.11",
-                        f"-DPYTHON_MODULE_EXTENSION=.cpython-311-{architecture.tuple}.so",
-                        f"-DHDF5_C_LIBRARIES={root}/usr/lib/{architecture.tuple}/libhdf5_serial.so",
-                        f"-DHDF5_C_INCLUDE_DIRS={root}/usr/include/hdf5/serial"]
-        run("cmake", "-S", ROOT, "-B", path, "-G", "Ninja", *options)
-        return path
 
     def build(self, tree, *targets):
         run("cmake", "--build", tree, "-j", self.jobs, "--target", *targets)
 
     def debian_packages(self, architecture):
         say(f"Debian packages for {architecture.name}")
-        tree = self.tree(architecture, "packages", f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
+        tree = build_tree(architecture, "packages", *PACKAGES, f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
         self.build(tree, "all")
         with tempfile.TemporaryDirectory() as scratch:
             run("cpack", "--config", tree / "CPackConfig.cmake", "-B", scratch)
@@ -155,7 +95,7 @@ class Release:
 
     def static_artefacts(self, architecture):
         say(f"the tarball and the wheel for {architecture.name}")
-        tree = self.tree(architecture, "static", "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
+        tree = build_tree(architecture, "static", *PACKAGES, "-DABSENC_STATIC=ON", "-DABSENC_SERVE=OFF", "-DABSENC_CUSE=OFF",
                          "-DABSENC_FTDI=OFF", "-DABSENC_HDF5=OFF")  # Debian has no static libudev, which libusb needs
         self.build(tree, "absenc-command", "absenc-manual", "absenc-python")
         self.tarball(architecture, tree)
@@ -174,8 +114,23 @@ class Release:
         """Returns the files of licences for these packages and for absenc itself."""
         files = {"LICENSE": ((ROOT / "LICENSE").read_bytes(), 0o644)}
         for package in packages:
-            files[f"licences/{package}"] = (Path(f"/usr/share/doc/{package}/copyright").read_bytes(), 0o644)
+            _, text = self.sources_of.get(package, ("", Path(f"/usr/share/doc/{package}/copyright")))
+            files[f"licences/{package}"] = (text.read_bytes(), 0o644)
         return files
+
+    def windows(self):
+        import libraries
+        import pack
+        say("absenc.exe")
+        folders = libraries.folders()
+        tree = ROOT / "build/tree-windows"
+        run("cmake", "--preset", "windows", "-S", ROOT, "-B", tree, "-D", "ABSENC_TESTS=OFF",
+            env={**os.environ, "ABSENC_WINDOWS_LIBRARIES": ";".join(folders)})
+        self.build(tree, "absenc-command")
+        self.sources_of |= {name: (version, Path(folder) / "copyright")
+                            for (name, version, _), folder in zip(libraries.LIBRARIES, folders)}
+        for path in pack.pack(tree, [Path(folder) for folder in folders]):
+            self.publish(path, [*pack.INSIDE, *self.sources_of])
 
     def tarball(self, architecture, tree):
         name = f"absenc-{VERSION}-linux-{architecture.processor.replace('armv7l', 'armv7')}"
@@ -190,7 +145,7 @@ class Release:
         for page in sorted((tree / "manual").glob("*.7")):
             files[f"share/man/man7/{page.name}"] = (page.read_bytes(), 0o644)
         path = TREES / f"{name}.tar.gz"
-        self.write_tar(path, {f"{name}/{file}": content for file, content in files.items()})
+        write_tar(path, {f"{name}/{file}": content for file, content in files.items()}, self.epoch)
         self.publish(path, inside)
 
     def wheel(self, architecture, tree):
@@ -229,7 +184,7 @@ class Release:
         sdist = {f"absenc-{VERSION}/{name}": content for name, content in files.items()}
         sdist[f"absenc-{VERSION}/PKG-INFO"] = (absenc_build.metadata().encode(), 0o644)
         path = TREES / f"absenc-{VERSION}.tar.gz"
-        self.write_tar(path, sdist)
+        write_tar(path, sdist, self.epoch)
         self.publish(path)
         self.firmware(files)
 
@@ -240,18 +195,18 @@ class Release:
         common = {name: files[name] for name in ("LICENSE", "README.md")}
 
         path = TREES / f"absenc-{VERSION}-platformio.tar.gz"  # users install it by: pio pkg install --library FILE
-        self.write_tar(path, {**sources, **common, "library.json": files["library.json"]})
+        write_tar(path, {**sources, **common, "library.json": files["library.json"]}, self.epoch)
         self.publish(path)
 
         own = {name: files[name] for name in ("CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake", "idf_component.yml")}
         path = TREES / f"absenc-{VERSION}-esp-idf.tar.gz"  # users unpack it into components/ of their project
-        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()}, self.epoch)
         self.publish(path)
 
         own = {name: content for name, content in files.items() if name.startswith(("zephyr/", "packages/zephyr/"))}
         own["cmake/sources.cmake"] = files["cmake/sources.cmake"]
         path = TREES / f"absenc-{VERSION}-zephyr.tar.gz"  # users unpack it and name its folder in ZEPHYR_EXTRA_MODULES
-        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()}, self.epoch)
         self.publish(path)
 
         import export
@@ -260,7 +215,7 @@ class Release:
             arduino = {str(file.relative_to(scratch)): (file.read_bytes(), 0o644)
                        for file in Path(scratch).rglob("*") if file.is_file()}
         path = TREES / f"absenc-{VERSION}-arduino.zip"  # users install it by: arduino-cli lib install --zip-path FILE
-        self.write_zip(path, arduino)
+        write_zip(path, arduino)
         self.publish(path)
 
     # --- lists ---
@@ -269,7 +224,7 @@ class Release:
         (self.output / "absenc.spdx.json").write_text(json.dumps(self.spdx(), indent=1, sort_keys=True) + "\n")
         used = sorted({package for packages in self.inside.values() for package in packages})
         path = TREES / f"absenc-{VERSION}-licences.tar.gz"
-        self.write_tar(path, self.licences(used))
+        write_tar(path, self.licences(used), self.epoch)
         shutil.copyfile(path, self.output / path.name)
         sums = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in sorted(self.output.iterdir()))
         (self.output / "SHA256SUMS").write_text(sums)
@@ -278,7 +233,7 @@ class Release:
         """Returns the list of all artefacts and of the code of others in them, as SPDX 2.3."""
         packages, relationships = [], []
         for name in sorted({package for inside in self.inside.values() for package in inside}):
-            version = run("dpkg-query", "-W", "-f=${Version}", name)
+            version, _ = self.sources_of.get(name) or (run("dpkg-query", "-W", "-f=${Version}", name), None)
             packages.append({"SPDXID": identifier(name), "name": name, "versionInfo": version, "supplier": "Organization: Debian",
                              "licenseConcluded": LICENCES[name], "licenseDeclared": LICENCES[name],
                              "copyrightText": "NOASSERTION", "downloadLocation": f"https://packages.debian.org/bookworm/{name}"})
@@ -320,32 +275,10 @@ def identifier(name):
     return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", name)
 
 
-def sysroot(architecture):
-    """Returns a folder with Debian 12's headers and libraries for this architecture; makes it once."""
-    root = TREES / f"sysroot-{architecture.name}"
-    if not (root / "complete").is_file():
-        say(f"Debian's headers and libraries for {architecture.name}")
-        shutil.rmtree(root, ignore_errors=True)
-        run("mmdebstrap", "--variant=extract", f"--architectures={architecture.name}", f"--include={','.join(SYSROOT_PACKAGES)}",
-            "bookworm", root)
-        relative_links(root)
-        (root / "complete").touch()
-    return root
-
-
-def relative_links(root):
-    """Makes absolute links in a root relative, so that a cross-compiler does not follow them into this computer."""
-    for path in root.rglob("*"):
-        if path.is_symlink() and os.readlink(path).startswith("/"):
-            target = root / os.readlink(path)[1:]
-            path.unlink()
-            path.symlink_to(os.path.relpath(target, path.parent))
-
-
 def main():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--only", default=",".join(ARCHITECTURES))
+    parser.add_argument("--only", default=",".join([*PUBLISHED, "windows"]))
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     chosen = parser.parse_args()
     changed = run("git", "-C", ROOT, "status", "--porcelain")
@@ -362,8 +295,11 @@ def main():
     release = Release(output, chosen.jobs, run("git", "-C", ROOT, "rev-parse", "--short=12", "HEAD").strip(), epoch)
     release.sources()
     for name in chosen.only.split(","):
-        release.debian_packages(ARCHITECTURES[name])
-        release.static_artefacts(ARCHITECTURES[name])
+        if name == "windows":
+            release.windows()
+            continue
+        release.debian_packages(PUBLISHED[name])
+        release.static_artefacts(PUBLISHED[name])
     release.lists()
     say(f"{len(release.inside)} artefacts are in {output}")
 

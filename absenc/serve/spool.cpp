@@ -50,7 +50,8 @@ Spool::Spool(std::string path, std::int64_t bytes) : path_(std::move(path)), mos
     begin_part();
     tidy();
   } catch (const os::Failure& failure) {
-    const bool is_ours = failure.kind() != os::Failure::Kind::in_use && failure.kind() != os::Failure::Kind::not_found;
+    using enum os::Failure::Kind;
+    const bool is_ours = failure.kind() != in_use && failure.kind() != not_found && failure.kind() != unsupported;
     if (!is_ours) throw Failure(fmt::format("the spool {}: {}", path_, failure.what()));
     fail(failure.what());
   }
@@ -91,7 +92,7 @@ void Spool::write_waiting() {
   if (newest_ == nullptr) begin_part();
   while (write_some()) {
     const std::size_t bytes = parts_.back().bytes;
-    if (bytes > part_limit_ && bytes > part_limit_ + spool_record(facts_).size()) begin_part();
+    if (bytes > part_limit_ && bytes > part_limit_ + spool_head(facts_).size()) begin_part();
   }
   const std::lock_guard lock(shown_mutex_);
   if (std::exchange(condition_.trouble, {}).empty()) return;

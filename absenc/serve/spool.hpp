@@ -34,8 +34,9 @@ class Spool {
     Counts& operator-=(const Counts& other);
   };
 
-  /// Opens the spool in the folder `path`; `bytes` limits the size of its files. Throws Failure if the spool is in use
-  /// or the folder above it is missing; `condition` reports other disk errors.
+  /// Opens the spool in the folder `path`; `bytes` limits the size of its files. Throws Failure if the spool is in
+  /// use, if a newer absenc has written it, or if the folder above it is missing; `condition` reports other disk
+  /// errors.
   Spool(std::string path, std::int64_t bytes);
 
   /// Returns a random text of 16 characters that stays the same as long as the spool exists.

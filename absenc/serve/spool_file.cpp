@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/serve/spool_file.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <utility>
@@ -17,7 +19,8 @@ namespace {
 constexpr std::size_t head_bytes = 10;
 constexpr std::size_t kind_at = 8, arrived_at = 9;
 constexpr std::size_t largest_body = 100'000'000;
-constexpr char kind_message = 'm', kind_facts = 'f', kind_forget = 'x';
+constexpr char kind_format = 'v', kind_message = 'm', kind_facts = 'f', kind_forget = 'x';
+constexpr std::uint32_t newest_format = 1;
 constexpr char is_waiting = 'w', has_arrived = 'a';
 
 // Returns the checksum of a record: FNV-1a over its kind and body.
@@ -62,49 +65,68 @@ std::string spool_record(const SpoolFacts& facts) {
   return record(kind_facts, body.bytes());
 }
 
+std::string spool_head(const SpoolFacts& facts) {
+  return record(kind_format, FieldWriter().add(newest_format).bytes()) + spool_record(facts);
+}
+
 std::string spool_record_without(std::string_view encoder) {
   return record(kind_forget, FieldWriter().add(encoder).bytes());
 }
 
 SpoolFile::SpoolFile(const std::string& path, const SpoolFacts& facts) : log_(path, os::LogFile::Open::fresh) {
-  if (const int error = log_.append(spool_record(facts)); error != 0) {
+  if (const int error = log_.append(spool_head(facts)); error != 0) {
     std::error_code ignored;
     std::filesystem::remove(os::path_of(path), ignored);
     throw os::system_failure("writing " + path, error);
   }
 }
 
-SpoolFile::SpoolFile(const std::string& path) : log_(path, os::LogFile::Open::existing) {}
+SpoolFile::SpoolFile(const std::string& path) : log_(path, os::LogFile::Open::existing) {
+  const std::optional<Record> first = read_record(0);
+  if (!first || first->kind != kind_format || first->body.size() != sizeof newest_format) return;
+  const std::uint32_t format = FieldReader(first->body).number();
+  if (format > newest_format) {
+    throw os::Failure(os::Failure::Kind::unsupported,
+                      fmt::format("{} has format {}, that of a newer absenc; this one knows formats up to {}: let the "
+                                  "newer one send it, or choose another folder",
+                                  path, format, newest_format));
+  }
+}
+
+// Returns the record at `offset`; nothing at the end of the file or if the record is damaged.
+std::optional<SpoolFile::Record> SpoolFile::read_record(std::size_t offset) const {
+  const std::string head = log_.read(offset, head_bytes);
+  if (head.size() < head_bytes) return {};
+  FieldReader numbers(head.substr(0, kind_at));
+  const std::uint32_t sum = numbers.number();
+  const std::size_t size = numbers.number();
+  if (size > largest_body) return {};
+  std::string body = log_.read(offset + head_bytes, size);
+  if (body.size() < size || checksum(head[kind_at], body) != sum) return {};
+  return Record{head[kind_at], head[arrived_at] == has_arrived, std::move(body), offset + head_bytes + size};
+}
 
 std::optional<SpoolFile::StoredMessage> SpoolFile::next(std::size_t& offset, SpoolFacts* facts) const {
   try {
-    for (;;) {
-      const std::string head = log_.read(offset, head_bytes);
-      if (head.size() < head_bytes) return {};
-      FieldReader numbers(head.substr(0, kind_at));
-      const std::uint32_t sum = numbers.number();
-      const std::size_t size = numbers.number();
-      if (size > largest_body) return {};
-      const std::string body = log_.read(offset + head_bytes, size);
-      if (body.size() < size || checksum(head[kind_at], body) != sum) return {};
+    while (std::optional<Record> record = read_record(offset)) {
       const std::size_t at = offset;
-      FieldReader fields(body);
-      if (head[kind_at] == kind_message) {
-        StoredMessage found{{}, at, head[arrived_at] == has_arrived};
+      FieldReader fields(std::move(record->body));
+      if (record->kind == kind_message) {
+        StoredMessage found{{}, at, record->arrived};
         found.message.id = static_cast<std::int64_t>(fields.long_number());
         found.message.readings = fields.long_number();
         found.message.topic = fields.text();
         found.message.payload = fields.text();
-        offset = at + head_bytes + size;
+        offset = record->end;
         return found;
       }
-      if (facts != nullptr && head[kind_at] == kind_facts) take_facts(fields, *facts);
-      if (facts != nullptr && head[kind_at] == kind_forget) facts->next_numbers.erase(fields.text());
-      offset = at + head_bytes + size;
+      if (facts != nullptr && record->kind == kind_facts) take_facts(std::move(fields), *facts);
+      if (facts != nullptr && record->kind == kind_forget) facts->next_numbers.erase(fields.text());
+      offset = record->end;
     }
   } catch (const client::Failure&) {  // a record with an invalid body ends the file, like a damaged record
-    return {};
   }
+  return {};
 }
 
 int SpoolFile::mark_arrived(std::size_t offset) const { return log_.replace(offset + arrived_at, has_arrived); }

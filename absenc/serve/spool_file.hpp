@@ -4,7 +4,8 @@
 //
 //   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body
 //
-// `arrived` shows whether the broker has acknowledged the message in the record.
+// `arrived` shows whether the broker has acknowledged the message in the record. A file begins with a record that holds
+// the format of the file; those of absenc 0.1.0 have none.
 #pragma once
 
 #include <cstddef>
@@ -40,6 +41,8 @@ struct SpoolFacts {
 
 [[nodiscard]] std::string spool_record(const Message& message);
 [[nodiscard]] std::string spool_record(const SpoolFacts& facts);
+/// Returns the records with which a file begins: its format, and `facts`.
+[[nodiscard]] std::string spool_head(const SpoolFacts& facts);
 /// Returns a record that deletes the number of the next reading of `encoder`.
 [[nodiscard]] std::string spool_record_without(std::string_view encoder);
 
@@ -47,7 +50,7 @@ class SpoolFile {
  public:
   /// Creates a file that begins with `facts`. Throws os::Failure.
   SpoolFile(const std::string& path, const SpoolFacts& facts);
-  /// Opens an existing file. Throws os::Failure.
+  /// Opens an existing file. Throws os::Failure, of kind `unsupported` if a newer absenc has written it.
   explicit SpoolFile(const std::string& path);
 
   [[nodiscard]] os::LogFile& log() { return log_; }
@@ -66,6 +69,14 @@ class SpoolFile {
   [[nodiscard]] int mark_arrived(std::size_t offset) const;
 
  private:
+  struct Record {
+    char kind = 0;
+    bool arrived = false;
+    std::string body{};
+    std::size_t end = 0;  // offset of the next record
+  };
+  [[nodiscard]] std::optional<Record> read_record(std::size_t offset) const;
+
   os::LogFile log_;
 };
 

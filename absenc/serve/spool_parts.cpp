@@ -74,6 +74,7 @@ void Spool::load_part(std::int64_t number) {
     }
     parts_.push_back(part);
   } catch (const os::Failure& failure) {
+    if (failure.kind() == os::Failure::Kind::unsupported) throw;
     const std::lock_guard lock(shown_mutex_);
     notes_.push_back(fmt::format("a file of the spool is not used: {}", failure.what()));
   }
@@ -173,7 +174,7 @@ void Spool::recount(Part& part) {
 // Deletes files without waiting messages. The last file stays, because it has the numbers of the next readings.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
-    if (newest_->log().shrink_to(spool_record(facts_))) {
+    if (newest_->log().shrink_to(spool_head(facts_))) {
       unwritten_numbers_.clear();
       parts_.back() = {parts_.back().number};
       parts_.back().bytes = newest_->log().size();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/serve/spool.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "absenc/client/error.hpp"
+#include "absenc/serve/fields.hpp"
 
 namespace absenc::serve {
 
@@ -131,6 +133,33 @@ TEST_F(SpoolTest, ReadsMessagesBeforeDamage) {
       ASSERT_EQ(spool.stored().messages, 1U) << at;
     }
   }
+}
+
+// The format is the number in the first record of a file: checksum, size, kind and mark are 10 bytes before it.
+TEST_F(SpoolTest, RefusesFormatOfNewerVersionAndReadsFilesWithoutFormat) {
+  {
+    Spool spool(path, million);
+    spool.add(messages(1, 3), {{"elbow", 11}});
+  }
+  const fs::path file = fs::directory_iterator(path)->path();
+  std::ifstream whole(file, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(whole), {}};
+  const auto write = [&](const std::string& content) { std::ofstream(file, std::ios::binary) << content; };
+
+  // FNV-1a over the kind 'v' and the number 2
+  write(FieldWriter().add(0xBAA6427BU).add(4U).bytes() + "vw" + FieldWriter().add(2U).bytes() + bytes.substr(14));
+  try {
+    const Spool spool(path, million);
+    FAIL() << "a newer spool was opened";
+  } catch (const client::Failure& failure) {
+    EXPECT_THAT(failure.what(), testing::HasSubstr("has format 2, that of a newer absenc"));
+  }
+  EXPECT_EQ(files(), 1U);
+
+  write(bytes.substr(14));
+  Spool spool(path, million);
+  EXPECT_EQ(ids(spool.after(0, 100)), (std::vector<std::int64_t>{1, 2, 3}));
+  EXPECT_EQ(spool.next_numbers().at("elbow"), 11U);
 }
 
 TEST_F(SpoolTest, RefusesSecondProcess) {

@@ -189,13 +189,13 @@ def build_missing(missing):
                 shutil.rmtree(f"{final}.{os.getpid()}")
 
 
-def main():
+def folders():
+    """Returns the folders of all libraries; builds those that are not there."""
     missing = [library for library in LIBRARIES if not os.path.isdir(folder_of(*library))]
     if missing:
         build_missing(missing)
-    for library in LIBRARIES:
-        print(folder_of(*library))
+    return [folder_of(*library) for library in LIBRARIES]
 
 
 if __name__ == "__main__":
-    main()
+    print("\n".join(folders()))

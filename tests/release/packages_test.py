@@ -6,7 +6,7 @@ import re
 import subprocess
 import unittest
 
-from root_support import RELEASE, SOURCE, VERSION, RootCase, artefact, base
+from root_support import RELEASE, SOURCE, VERSION, RootCase, WholeInstallation, artefact, base
 
 PACKAGES = ("absenc", "absenc-serve", "absenc-hdf5", "libabsenc-dev", "python3-absenc")
 # Tags of lintian that are allowed, and why.
@@ -27,7 +27,7 @@ def archive():
     return base("bookworm-with-dependencies", "bookworm", dependencies())
 
 
-class Installed(RootCase):
+class Installed(WholeInstallation, RootCase):
     archive = staticmethod(archive)
 
     @classmethod
@@ -38,39 +38,10 @@ class Installed(RootCase):
             cls.case.put(artefact(f"{package}_*_amd64.deb"))
         cls.case.shell("dpkg -i /srv/*.deb", timeout=300)
 
-    def test_command(self):
-        self.try_the_command("absenc")
-
     def test_command_loads_few_libraries(self):
         loaded = self.shell("ldd /usr/bin/absenc").splitlines()
         self.assertLessEqual(len(loaded), 20, loaded)
         self.assertEqual([line for line in loaded if re.search("hdf5|curl|gnutls|ldap", line)], [])
-
-    def test_each_format_of_captures(self):
-        for ending in ("sr", "vcd", "csv"):
-            with self.subTest(ending):
-                name = f"/srv/wave.{ending}"
-                self.run_inside("absenc", "wave", "tformat", name)
-                self.assertIn("deg", self.run_inside("absenc", "decode", "tformat", name))
-
-    def test_hdf5(self):
-        self.run_inside("absenc", "record", "sim:tformat", "--output", "/srv/log.h5", "--count", "3")
-        said = self.run_inside("python3", "-c", "import h5py; print(len(h5py.File('/srv/log.h5')['time_s']))")
-        self.assertEqual(said, "3\n")
-
-    def test_server_with_its_page(self):
-        said = self.shell("""
-            absenc serve sim:tformat --listen 127.0.0.1:8420 --history none >/tmp/serve 2>&1 & server=$!
-            while ! grep -q '^http' /tmp/serve; do kill -0 $server; done
-            curl -fsS http://127.0.0.1:8420/ | head -c 300
-            echo
-            curl -fsS http://127.0.0.1:8420/openapi.json | head -c 100
-            kill $server""")
-        self.assertIn("<!doctype html>", said.lower())
-        self.assertIn("openapi", said)
-
-    def test_python(self):
-        self.assertIn("True", self.run_inside("python3", "-c", "import absenc; print(absenc.open('sim:tformat').read().valid)"))
 
     def test_service_has_a_user_and_waits_for_its_configuration(self):
         self.assertIn("dialout", self.run_inside("id", "absenc"))

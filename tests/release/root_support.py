@@ -44,6 +44,8 @@ class RootCase(unittest.TestCase):
     """A test in a root that is unpacked for each class."""
 
     archive = None  # function that returns the path of the archive that is unpacked as root folder
+    isolated = ISOLATED
+    programs = "/usr/sbin:/usr/bin:/sbin:/bin"  # the folders with programs (PATH)
 
     @classmethod
     def setUpClass(cls):
@@ -59,9 +61,9 @@ class RootCase(unittest.TestCase):
             (cls.root / folder).mkdir(exist_ok=True)
 
     def run_inside(self, *command, status=0, timeout=120):
-        done = subprocess.run([*ISOLATED, str(self.root), *map(str, command)], stdin=subprocess.DEVNULL,
+        done = subprocess.run([*self.isolated, str(self.root), *map(str, command)], stdin=subprocess.DEVNULL,
                               capture_output=True, text=True, timeout=timeout,
-                              env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/srv", "LC_ALL": "C.UTF-8",
+                              env={"PATH": self.programs, "HOME": "/srv", "LC_ALL": "C.UTF-8",
                                    "DEBIAN_FRONTEND": "noninteractive"})
         if status is not None:
             self.assertEqual(done.returncode, status, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}")
@@ -92,3 +94,36 @@ class RootCase(unittest.TestCase):
             {absenc} read "tformat:$(sed -n 's/^ready: //p' /tmp/emulator | grep tcp)" --count 2
             kill $emulator""")
         self.assertEqual(said.count("no alarms"), 2, said)
+
+
+class WholeInstallation:
+    """What an installation of all packages can do, for classes with RootCase."""
+
+    def test_command(self):
+        self.try_the_command("absenc")
+
+    def test_each_format_of_captures(self):
+        for ending in ("sr", "vcd", "csv"):
+            with self.subTest(ending):
+                name = f"/srv/wave.{ending}"
+                self.run_inside("absenc", "wave", "tformat", name)
+                self.assertIn("deg", self.run_inside("absenc", "decode", "tformat", name))
+
+    def test_hdf5(self):
+        self.run_inside("absenc", "record", "sim:tformat", "--output", "/srv/log.h5", "--count", "3")
+        said = self.run_inside("/usr/bin/python3", "-c", "import h5py; print(len(h5py.File('/srv/log.h5')['time_s']))")
+        self.assertEqual(said, "3\n")
+
+    def test_server_with_its_page(self):
+        said = self.shell("""
+            absenc serve sim:tformat --listen 127.0.0.1:8420 --history none >/tmp/serve 2>&1 & server=$!
+            while ! grep -q '^http' /tmp/serve; do kill -0 $server; done
+            curl -fsS http://127.0.0.1:8420/ | head -c 300
+            echo
+            curl -fsS http://127.0.0.1:8420/openapi.json | head -c 100
+            kill $server""")
+        self.assertIn("<!doctype html>", said.lower())
+        self.assertIn("openapi", said)
+
+    def test_python(self):
+        self.assertIn("True", self.run_inside("python3", "-c", "import absenc; print(absenc.open('sim:tformat').read().valid)"))

@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <cstring>
 
-// This file is compiled once for each instruction set (hwy/foreach_target.h).
+// This file is compiled once for each instruction set (hwy/foreach_target.h): the compiler's own, SSE4 and AVX2.
+// AVX-512 and SVE are not faster here.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE_256 | HWY_SVE2 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "absenc/capture/lines/edges.cpp"
 #include <hwy/foreach_target.h>
@@ -131,13 +133,32 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace absenc::capture {
 
-HWY_EXPORT(find);
+// The library libhwy would tell, too, which instruction sets the processor has, but it measures its clock at the start
+// of each program, which takes as long as all else in `absenc --version`.
+std::span<const ChangeFinder> change_finders() {
+  static const std::vector<ChangeFinder> finders = [] {
+    std::vector<ChangeFinder> found;
+#if HWY_TARGETS & HWY_AVX2
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+        __builtin_cpu_supports("fma") && __builtin_cpu_supports("pclmul")) {
+      found.push_back(N_AVX2::find);
+    }
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("pclmul")) found.push_back(N_SSE4::find);
+#endif
+    found.push_back(HWY_STATIC_DISPATCH(find));
+    return found;
+  }();
+  return finders;
+}
 
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes) {
+  const ChangeFinder find = change_finders().front();
   for (Changes& each : changes) each.at.clear();
   for (std::size_t i = 0; i < channels.size(); i += 64) {
     const std::size_t count = std::min<std::size_t>(64, channels.size() - i);
-    HWY_DYNAMIC_DISPATCH(find)(block, channels.subspan(i, count), changes.subspan(i, count));
+    find(block, channels.subspan(i, count), changes.subspan(i, count));
   }
 }
 

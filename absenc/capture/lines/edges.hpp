@@ -22,6 +22,12 @@ namespace absenc::capture {
 /// Sets `changes[i].at` for `channels[i]`; `changes[i].before` must be the level before the block.
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
 
+/// A function like `find_changes` that uses the instructions of one set; for at most 64 channels, and it adds to
+/// `changes[i].at`.
+using ChangeFinder = void (*)(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
+/// Returns these functions for the instruction sets that this processor has, the fastest first; at least one.
+[[nodiscard]] std::span<const ChangeFinder> change_finders();
+
 /// Returns the level after the last of `changes`, or the level before them if there is none.
 [[nodiscard]] inline bool level_after(const Changes& changes) { return changes.before != (changes.at.size() % 2 != 0); }
 

@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs what is built for arm64 and armhf, and the layers from core to capture for a big-endian machine, in emulators."""
+import os
+import re
+import subprocess
+import sys
+import unittest
+
+from root_support import ISOLATED, SOURCE, VERSION, RootCase, WholeInstallation, artefact
+
+sys.path.insert(0, str(SOURCE / "packages"))
+from architectures import BIG_ENDIAN, PUBLISHED, build_tree
+
+# Tests of the command that are left out in an emulator, and why.
+LEFT_OUT = {
+    "they start other programs of the command's architecture, which the emulator cannot":
+        "serve_.*|serve|mqtt_.*|bug_report|record_hdf5|python.*|readme|first_minutes",
+    "they look at the process of the command, which is that of the emulator": "realtime|speed",
+    "they build or look at the sources": "compiled_together|docs|include_direction|install|mutants_script|new_protocol|packages|"
+                                         "type_names|unit_declaration|word|stability|tables|ftdi_wave",
+}
+
+
+def run_tests(tree, *options):
+    """Runs the tests of a build tree and returns the last lines of ctest."""
+    environment = {**os.environ, "ABSENC_CASES_PERCENT": "10", "RC_PARAMS": "max_success=20"}
+    done = subprocess.run(["ctest", "--test-dir", tree, "-j", str(os.cpu_count()), "--output-on-failure", "-LE", "long", *options],
+                          capture_output=True, text=True, env=environment, check=False)
+    (tree / "emulated.log").write_text(done.stdout)
+    closing = re.search(r"\d+% tests passed, (\d+) tests? failed out of (\d+)", done.stdout)
+    if closing is None or done.returncode != 0:
+        raise AssertionError(done.stdout[-6000:] + done.stderr[-1000:])
+    print(f"{tree.name}: {closing[0]}")
+    return int(closing[2])
+
+
+def built(architecture, *options):
+    """Returns a build tree of this architecture with its tests."""
+    tree = build_tree(architecture, "packages", "-DABSENC_TESTS=ON", *options)
+    subprocess.run(["cmake", "--build", tree, "-j", str(os.cpu_count())], check=True, capture_output=True)
+    return tree
+
+
+class Emulated:
+    """An architecture whose packages are unpacked and run in an emulator, without a network."""
+
+    # /srv and /tmp are those of the test
+    isolated = [*ISOLATED[:-2], 'ip link set lo up; mount -t proc proc /proc; mount --bind "$1/srv" /srv; '
+                                'mount -t tmpfs none /tmp; shift; exec "$@"', "sh"]
+    programs = f"/srv/bin:{RootCase.programs}"
+    architecture = None
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        packages = cls.root / "srv/packages"
+        for package in ("absenc", "absenc-serve", "absenc-hdf5", "python3-absenc"):
+            subprocess.run(["dpkg-deb", "-x", artefact(f"{package}_*_{cls.architecture.name}.deb"), packages], check=True)
+        emulator = " ".join(cls.architecture.emulated())
+        sysroot = cls.architecture.sysroot()
+        (cls.root / "srv/bin").mkdir()
+        # the emulator cannot start programs, so the script starts what `absenc serve` would start
+        cls.write_program("absenc", f"""program=bin/absenc
+            [ "$1" != serve ] || program=lib/absenc/absenc-serve
+            exec {emulator} /srv/packages/usr/$program "$@\"""")
+        cls.write_program("python3", f"""export PYTHONPATH=/srv/packages/usr/lib/python3/dist-packages
+            exec {emulator} {sysroot}/usr/bin/python3.11 "$@\"""")
+
+    @classmethod
+    def write_program(cls, name, script):
+        path = cls.root / "srv/bin" / name
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+
+    def test_tarball(self):
+        name = f"absenc-{VERSION}-linux-{self.architecture.processor.replace('armv7l', 'armv7')}"
+        subprocess.run(["tar", "-xzf", artefact(f"{name}.tar.gz"), "-C", self.root / "srv"], check=True)
+        self.write_program("from-tarball", f'exec {self.architecture.emulator} /srv/{name}/bin/absenc "$@"')
+        self.try_the_command("from-tarball")
+
+    def test_units_and_command(self):
+        tree = built(self.architecture, "-DABSENC_PYTHON=ON")
+        left_out = "|".join(LEFT_OUT.values())
+        self.assertGreater(run_tests(tree, "-E", rf"^({left_out})\.py$"), 60)
+
+
+class Arm64(Emulated, WholeInstallation, RootCase):
+    architecture = PUBLISHED["arm64"]
+
+
+class Armhf(Emulated, WholeInstallation, RootCase):
+    architecture = PUBLISHED["armhf"]
+
+
+class BigEndian(unittest.TestCase):
+    def test_layers_from_core_to_capture(self):
+        tree = built(BIG_ENDIAN, "-DABSENC_COMMAND=OFF", "-DABSENC_CLIENT=OFF", "-DABSENC_INSTALL=OFF")
+        self.assertGreater(run_tests(tree), 20)
+
+
+if __name__ == "__main__":
+    unittest.main()
