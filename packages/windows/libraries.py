@@ -95,7 +95,10 @@ def build_hdf5(source, prefix):  # only the library for C; programs that its bui
     build = f"{source}/build"  # these programs write into the folder in which CMake runs
     os.makedirs(build)
     with Prefix() as wine:
-        run(*CMAKE, "-S", source, "-B", build, "-D", "CMAKE_C_FLAGS=" + " ".join(FLAGS), "-D",
+        # no paths and dates of this build in the library, so that each build gives the same bits
+        flags = [*FLAGS, f"-fmacro-prefix-map={source}/="]
+        run(*CMAKE, "-S", source, "-B", build, "-D", "CMAKE_C_FLAGS=" + " ".join(flags), "-D",
+            "HDF5_ENABLE_EMBEDDED_LIBINFO=OFF", "-D",
             f"CMAKE_CROSSCOMPILING_EMULATOR={WINE}", "-D", "H5_HAVE_UNISTD_H=0",  # where it is, HDF5 wants sys/wait.h
             "-D", "BUILD_TESTING=OFF",
             *(word for part in ("TOOLS", "EXAMPLES", "CPP_LIB", "HL_LIB") for word in ("-D", f"HDF5_BUILD_{part}=OFF")),
