@@ -351,7 +351,8 @@ Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
                "the start bit is late even at 100 kHz: the position takes too long to be calculated",
                "compute the delay from the cable (10 ns for each metre) and the transceivers, and set line_delay_ns"};
   }
-  if (high > low && co_await clocks_at(dialog, high) == earliest) low = high;
+  const bool moves = high > low && co_await clocks_at(dialog, high) != earliest;
+  if (!moves) low = high;
   Time delay = shortest_delay(dialog);
   while (high - low > low / 50 + 1) {
     const auto middle = static_cast<std::uint16_t>((low + high) / 2);
@@ -361,6 +362,7 @@ Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
   }
   dialog.set_format(given);
   found.line_delay = static_cast<std::uint32_t>(delay.count());
+  found.delay_shorter = !moves;
   co_return done;
 }
 

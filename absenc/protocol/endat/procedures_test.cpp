@@ -216,11 +216,14 @@ TEST(EndatProcedures, MeasuresTheDelayOfTheLine) {
     const auto measured = bench.run("line-delay");
     ASSERT_EQ(measured.error, Error::none) << measured.detail;
     EXPECT_NEAR(static_cast<double>(measured.numbers.at("line_delay_ns")), delay, delay * 0.04);
+    EXPECT_EQ(measured.numbers.at("delay_shorter"), 0);
   }
   // A delay below half a period of the fastest clock at which the position is ready in time moves no start bit.
   Bench near("singleturn_bits=25 clock_khz=8000 line_delay_ns=20");
   near.options = author::testing::options_of(endat::unit, "singleturn_bits=25 clock_khz=8000 latency_us=5");
-  EXPECT_LE(near.run("line-delay").numbers.at("line_delay_ns"), 250);
+  const auto short_one = near.run("line-delay");
+  EXPECT_EQ(short_one.numbers.at("line_delay_ns"), 250);
+  EXPECT_EQ(short_one.numbers.at("delay_shorter"), 1);
 }
 
 TEST(EndatProcedures, DelayIsLongerOnPortsThatSampleLate) {
