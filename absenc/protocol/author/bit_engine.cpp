@@ -113,6 +113,7 @@ void BitEngine::feed(const ByteEvent& event) {
 
 void BitEngine::received(const ByteEvent& event) {
   received_at_ = event.at;
+  sampled_after_ = event.width;
   if (state_ == State::added) return conclude_with(reply_error_);
   append({event.items, std::min({event.bits, 8 * event.items.size(), awaited_})});
   const bool whole = event.bits >= awaited_;

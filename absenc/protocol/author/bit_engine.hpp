@@ -72,6 +72,9 @@ class BitEngine : public Conversation<std::uint8_t> {
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Returns the end of the last exchange.
   [[nodiscard]] Time received_at() const { return received_at_; }
+  /// Returns the time from the edge at which the encoder changes a bit until the port samples it, in the last transfer;
+  /// 0: half a period of the clock.
+  [[nodiscard]] Time sampled_after() const { return sampled_after_; }
   /// Returns the bits received last, valid or not.
   [[nodiscard]] BitView reply() const { return {Bytes(storage_).first((size_ + 7) / 8), size_}; }
   /// Returns false: an encoder on a clocked line cannot send without a clock.
@@ -128,6 +131,7 @@ class BitEngine : public Conversation<std::uint8_t> {
   Time begun_at_{};
   Time sent_at_{};
   Time received_at_{};
+  Time sampled_after_{};
 };
 
 }  // namespace absenc::author

@@ -29,19 +29,21 @@ constexpr auto clauses = std::array{
            .demand = Demand::byte_alone,
            .page = 0xA9,
            .address = 8},
-    // Before the zero, which resets the encoder. Tests show it with a warning, because no zero may be set while an error
-    // message is set.
+    // The zero resets the encoder, which ends warnings; positions report warnings only with additional information. So
+    // with information the clause about warnings is tested instead.
+    Clause{.id = "zero",
+           .paragraph = "Zero by datum shift",
+           .words = "the datum shift makes this the zero of the turn, to a signal period",
+           .demand = Demand::zero,
+           .needs = "info1=0x00"},
     Clause{.id = "clear-alarms",
            .paragraph = "Alarms",
            .words = "0 written to the warnings clears them, and nothing else",
            .demand = Demand::reset,
+           .needs = "info1!=0x00",
            .value = alarm::warnings,
            .verb = Verb::clear_alarms,
            .shown_with = "info1=0x40"},
-    Clause{.id = "zero",
-           .paragraph = "Zero by datum shift",
-           .words = "the datum shift makes this the zero of the turn, to a signal period",
-           .demand = Demand::zero},
 };
 
 }  // namespace

@@ -327,10 +327,16 @@ Part<std::size_t> clocks_at(Dialog& dialog, std::uint16_t khz) {
   co_return first;
 }
 
+// Returns the shortest delay of the line that moves the start bit by a clock, at the clock rate of the last exchange.
+Time shortest_delay(const Dialog& dialog) {
+  return dialog.sampled_after() != Time{} ? dialog.sampled_after() : dialog.format().period() / 2;
+}
+
 }  // namespace
 
 // At a clock so slow that the position is ready behind the mode command, the start bit comes with clock 11. The delay
-// moves it by a clock as soon as it is longer than half a period: the slowest clock at which it does is searched.
+// moves it by a clock as soon as it is longer than the time from the edge to the sample, which is half a period on most
+// ports: the slowest clock at which it does is searched.
 Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const Format given = dialog.format();
@@ -345,14 +351,18 @@ Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
                "the start bit is late even at 100 kHz: the position takes too long to be calculated",
                "compute the delay from the cable (10 ns for each metre) and the transceivers, and set line_delay_ns"};
   }
-  if (high > low && co_await clocks_at(dialog, high) == earliest) low = high;
+  const bool moves = high > low && co_await clocks_at(dialog, high) != earliest;
+  if (!moves) low = high;
+  Time delay = shortest_delay(dialog);
   while (high - low > low / 50 + 1) {
     const auto middle = static_cast<std::uint16_t>((low + high) / 2);
     const std::size_t clocks = co_await clocks_at(dialog, middle);
     (clocks == earliest ? low : high) = middle;
+    if (clocks != earliest) delay = shortest_delay(dialog);
   }
   dialog.set_format(given);
-  found.line_delay = 500'000u / high;
+  found.line_delay = static_cast<std::uint32_t>(delay.count());
+  found.delay_shorter = !moves;
   co_return done;
 }
 
