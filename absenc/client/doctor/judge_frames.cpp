@@ -241,8 +241,8 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
 }
 
 // Counts the damaged frames of a stream that were discarded without making a reading fail.
-std::size_t unreported(const std::vector<Attempted>& readings) {
-  std::size_t count = 0;
+std::uint64_t unreported(const std::vector<Attempted>& readings) {
+  std::uint64_t count = 0;
   for (const Attempted& one : readings) {
     count += one.discarded - std::min<std::uint64_t>(one.discarded, is_damaged(one) ? 1 : 0);
   }
@@ -281,7 +281,7 @@ All damaged_requests(const Case& one) {
 }
 
 Finding some_damage(const Case& one, const All& all) {
-  const std::size_t more = unreported(one.seen.readings);
+  const std::uint64_t more = unreported(one.seen.readings);
   std::vector<std::string> values{fmt::format("{}", all.size() + more),
                                   fmt::format("{}", one.seen.readings.size() + one.seen.repeated.size() + more),
                                   errors_of(all)};
@@ -451,7 +451,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     const bool are_cut = std::ranges::all_of(all, [&](const Attempted* attempt) { return is_cut(one.seen, *attempt); });
     if (!are_cut || !may_be_the_computer(one.seen, both.size())) findings.push_back(some_damage(one, both));
   }
-  const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
+  const std::uint64_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may collide with the next request, so that the next reading fails as well.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));
