@@ -62,7 +62,7 @@ if(TARGET absenc-client)
   # absenc::client needs none of the suggested packages: they are for absenc::captures, absenc::ftdi, absenc::gpio and
   # absenc::hdf5
   string(JOIN ", " CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SUGGESTS
-         libdeflate-dev libftdi1-dev libgpiod-dev libhdf5-dev libhwy-dev libminizip-dev libusb-1.0-0-dev)
+         libdeflate-dev libftdi1-dev libgpiod-dev libhdf5-dev libminizip-dev libusb-1.0-0-dev)
 endif()
 
 if(TARGET absenc-python)

@@ -87,7 +87,8 @@ class Release:
         tree = build_tree(architecture, "packages", *PACKAGES, f"-DCPACK_DEBIAN_PACKAGE_ARCHITECTURE={architecture.name}")
         self.build(tree, "all")
         with tempfile.TemporaryDirectory() as scratch:
-            run("cpack", "--config", tree / "CPackConfig.cmake", "-B", scratch)
+            path = os.environ["PATH"] if architecture.native else f"{ROOT}/packages/cross:{os.environ['PATH']}"
+            run("cpack", "--config", tree / "CPackConfig.cmake", "-B", scratch, env={**os.environ, "PATH": path})
             for package in sorted(Path(scratch).glob("*.deb")):
                 inside = HEADERS + {"absenc-serve": ["libjs-dygraphs"], "python3-absenc": ["pybind11-dev"]}.get(
                     package.name.split("_")[0], [])
