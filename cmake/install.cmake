@@ -35,11 +35,15 @@ absenc_pkgconfig(absenc "${PROJECT_DESCRIPTION}" "" absenc)
 if(TARGET absenc-client)
   set(same "= ${PROJECT_VERSION}")
   absenc_pkgconfig(absenc-client "Absolute encoders by address: read, set up, emulate" "absenc ${same}"
-                   absenc-client absenc-search absenc-os)
+                   absenc-client absenc-search absenc-os ${absenc_windows_libraries})
   absenc_pkgconfig(absenc-configuration "Names of absenc.toml for absenc-client" "absenc-client ${same}"
                    absenc-configuration)
+  set(zip_libraries)
+  if(ABSENC_ZIP)
+    set(zip_libraries minizip z ${libdeflate_LIBRARIES})
+  endif()
   absenc_pkgconfig(absenc-captures "Captures of logic analysers, decoded" "absenc-client ${same}" absenc-captures
-                   absenc-capture minizip z ${libdeflate_LIBRARIES})
+                   absenc-capture ${zip_libraries})
   absenc_pkgconfig(absenc-recording "Recordings of encoders as CSV and JSON lines" "absenc-client ${same}"
                    absenc-recording)
 endif()
@@ -110,7 +114,7 @@ if(TARGET absenc-command)
   endif()
 endif()
 
-if(PROJECT_IS_TOP_LEVEL)
+if(PROJECT_IS_TOP_LEVEL AND NOT WIN32)  # ./dev windows packs archives
   # creates CMake's list of installed files now, as the user who builds: if root created it during an installation, this
   # user could not write it afterwards
   file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")

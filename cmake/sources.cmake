@@ -8,7 +8,8 @@ set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -f
 
 # Folders whose sources belong to libraries of their own, because they need libraries of the system.
 set(absenc_separate_folders absenc/os/linux/cuse absenc/os/linux/without_cuse absenc/os/linux/ftdi
-    absenc/os/linux/gpio absenc/capture/files/without_zip tools/absenc/monitor/without_screen)
+    absenc/os/linux/gpio absenc/capture/files/without_zip tools/absenc/monitor/without_screen
+    tools/absenc/without_server_program tools/absenc/without_hdf5_plugin)
 
 # Folders of absenc/os for other systems than that of the target, as a regular expression.
 if(CMAKE_SYSTEM_NAME STREQUAL "Windows")
@@ -33,7 +34,7 @@ function(absenc_sources result)
   foreach(folder IN LISTS absenc_separate_folders)
     if(NOT folder IN_LIST ARGN)
       list(FILTER found EXCLUDE REGEX "/${folder}/")
-    elseif(folder MATCHES "^(.+)/without_[a-z0-9]+$")  # its sources are in place of those above it
+    elseif(folder MATCHES "^(.+)/without_[a-z0-9_]+$")  # its sources are in place of those above it
       file(GLOB replaced RELATIVE "${absenc_root}/${folder}" "${absenc_root}/${folder}/*.cpp")
       list(TRANSFORM replaced PREPEND "${absenc_root}/${CMAKE_MATCH_1}/")
       list(REMOVE_ITEM found ${replaced})

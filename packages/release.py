@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: release.py OUTPUT [--only amd64,arm64,armhf] [--jobs N]
+"""usage: release.py OUTPUT [--only amd64,arm64,armhf,windows] [--jobs N]
 
 Builds everything that is published into the folder OUTPUT, which must not exist: Debian packages, static tarballs, wheels,
-the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/tree-*.
+archives for Windows, the sources, packages for firmware, licences, an SPDX list and SHA256SUMS. Build trees are kept in build/tree-*.
 The same commit gives the same bits: nothing in an artefact depends on folder, user or time.
 """
 import argparse
-import gzip
 import hashlib
 import io
 import json
@@ -18,14 +17,15 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from archives import write_tar, write_zip
 from architectures import PUBLISHED, ROOT, TREES, build_tree, run, say
 
 VERSION = (ROOT / "VERSION").read_text().strip()
 sys.path.insert(0, str(ROOT / "packages/arduino"))
+sys.path.insert(0, str(ROOT / "packages/windows"))
 sys.path.insert(0, str(ROOT / "python/backend"))
 
 # Licences of what is inside an artefact, by the Debian package that it comes from.
@@ -43,6 +43,17 @@ LICENCES = {
     "libhwy-dev": "Apache-2.0",
     "pybind11-dev": "BSD-3-Clause",
     "libjs-dygraphs": "MIT",
+    "gcc-mingw-w64-base": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "mingw-w64-x86-64-dev": "ZPL-2.1",
+    "libz-mingw-w64-dev": "Zlib",
+    # source packages, from which packages/windows/libraries.py builds
+    "libdeflate": "MIT",
+    "minizip": "Zlib",
+    "sqlite3": "blessing",
+    "libmicrohttpd": "LGPL-2.1-or-later",
+    "mosquitto": "EPL-2.0 OR BSD-3-Clause",
+    "hdf5": "BSD-3-Clause",
+    "ncurses": "X11-distribute-modifications-variant",
 }
 # Packages whose headers contain code that is compiled into the command absenc on every architecture.
 HEADERS = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev"]
@@ -60,32 +71,11 @@ class Release:
     commit: str
     epoch: int
     inside: dict = field(default_factory=dict)  # for each artefact, the Debian packages whose code it contains
+    sources_of: dict = field(default_factory=dict)  # for each source package in them, its version and its licence's file
 
     def publish(self, path, packages=()):
         shutil.copyfile(path, self.output / path.name)
         self.inside[path.name] = list(packages)
-
-    # --- archives whose bits depend on nothing but their content ---
-
-    def write_tar(self, path, files):
-        """Writes {name: (bytes, mode)} as a .tar.gz."""
-        plain = io.BytesIO()
-        with tarfile.open(fileobj=plain, mode="w", format=tarfile.PAX_FORMAT) as archive:
-            for name in sorted(files):
-                content, mode = files[name]
-                info = tarfile.TarInfo(name)
-                info.size, info.mode, info.mtime = len(content), mode, self.epoch
-                archive.addfile(info, io.BytesIO(content))
-        path.write_bytes(gzip.compress(plain.getvalue(), 9, mtime=0))
-
-    def write_zip(self, path, files):
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name in sorted(files):
-                content, mode = files[name]
-                info = zipfile.ZipInfo(name)  # without a given date, ZipInfo dates each file 1980-01-01
-                info.external_attr = (0o100000 | mode) << 16
-                info.compress_type = zipfile.ZIP_DEFLATED
-                archive.writestr(info, content)
 
     # --- building ---
 
@@ -124,8 +114,23 @@ class Release:
         """Returns the files of licences for these packages and for absenc itself."""
         files = {"LICENSE": ((ROOT / "LICENSE").read_bytes(), 0o644)}
         for package in packages:
-            files[f"licences/{package}"] = (Path(f"/usr/share/doc/{package}/copyright").read_bytes(), 0o644)
+            _, text = self.sources_of.get(package, ("", Path(f"/usr/share/doc/{package}/copyright")))
+            files[f"licences/{package}"] = (text.read_bytes(), 0o644)
         return files
+
+    def windows(self):
+        import libraries
+        import pack
+        say("absenc.exe")
+        folders = libraries.folders()
+        tree = ROOT / "build/tree-windows"
+        run("cmake", "--preset", "windows", "-S", ROOT, "-B", tree, "-D", "ABSENC_TESTS=OFF",
+            env={**os.environ, "ABSENC_WINDOWS_LIBRARIES": ";".join(folders)})
+        self.build(tree, "absenc-command")
+        self.sources_of |= {name: (version, Path(folder) / "copyright")
+                            for (name, version, _), folder in zip(libraries.LIBRARIES, folders)}
+        for path in pack.pack(tree, [Path(folder) for folder in folders]):
+            self.publish(path, [*pack.INSIDE, *self.sources_of])
 
     def tarball(self, architecture, tree):
         name = f"absenc-{VERSION}-linux-{architecture.processor.replace('armv7l', 'armv7')}"
@@ -140,7 +145,7 @@ class Release:
         for page in sorted((tree / "manual").glob("*.7")):
             files[f"share/man/man7/{page.name}"] = (page.read_bytes(), 0o644)
         path = TREES / f"{name}.tar.gz"
-        self.write_tar(path, {f"{name}/{file}": content for file, content in files.items()})
+        write_tar(path, {f"{name}/{file}": content for file, content in files.items()}, self.epoch)
         self.publish(path, inside)
 
     def wheel(self, architecture, tree):
@@ -179,7 +184,7 @@ class Release:
         sdist = {f"absenc-{VERSION}/{name}": content for name, content in files.items()}
         sdist[f"absenc-{VERSION}/PKG-INFO"] = (absenc_build.metadata().encode(), 0o644)
         path = TREES / f"absenc-{VERSION}.tar.gz"
-        self.write_tar(path, sdist)
+        write_tar(path, sdist, self.epoch)
         self.publish(path)
         self.firmware(files)
 
@@ -190,18 +195,18 @@ class Release:
         common = {name: files[name] for name in ("LICENSE", "README.md")}
 
         path = TREES / f"absenc-{VERSION}-platformio.tar.gz"  # users install it by: pio pkg install --library FILE
-        self.write_tar(path, {**sources, **common, "library.json": files["library.json"]})
+        write_tar(path, {**sources, **common, "library.json": files["library.json"]}, self.epoch)
         self.publish(path)
 
         own = {name: files[name] for name in ("CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake", "idf_component.yml")}
         path = TREES / f"absenc-{VERSION}-esp-idf.tar.gz"  # users unpack it into components/ of their project
-        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()}, self.epoch)
         self.publish(path)
 
         own = {name: content for name, content in files.items() if name.startswith(("zephyr/", "packages/zephyr/"))}
         own["cmake/sources.cmake"] = files["cmake/sources.cmake"]
         path = TREES / f"absenc-{VERSION}-zephyr.tar.gz"  # users unpack it and name its folder in ZEPHYR_EXTRA_MODULES
-        self.write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()})
+        write_tar(path, {f"absenc/{name}": content for name, content in {**sources, **common, **own}.items()}, self.epoch)
         self.publish(path)
 
         import export
@@ -210,7 +215,7 @@ class Release:
             arduino = {str(file.relative_to(scratch)): (file.read_bytes(), 0o644)
                        for file in Path(scratch).rglob("*") if file.is_file()}
         path = TREES / f"absenc-{VERSION}-arduino.zip"  # users install it by: arduino-cli lib install --zip-path FILE
-        self.write_zip(path, arduino)
+        write_zip(path, arduino)
         self.publish(path)
 
     # --- lists ---
@@ -219,7 +224,7 @@ class Release:
         (self.output / "absenc.spdx.json").write_text(json.dumps(self.spdx(), indent=1, sort_keys=True) + "\n")
         used = sorted({package for packages in self.inside.values() for package in packages})
         path = TREES / f"absenc-{VERSION}-licences.tar.gz"
-        self.write_tar(path, self.licences(used))
+        write_tar(path, self.licences(used), self.epoch)
         shutil.copyfile(path, self.output / path.name)
         sums = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in sorted(self.output.iterdir()))
         (self.output / "SHA256SUMS").write_text(sums)
@@ -228,7 +233,7 @@ class Release:
         """Returns the list of all artefacts and of the code of others in them, as SPDX 2.3."""
         packages, relationships = [], []
         for name in sorted({package for inside in self.inside.values() for package in inside}):
-            version = run("dpkg-query", "-W", "-f=${Version}", name)
+            version, _ = self.sources_of.get(name) or (run("dpkg-query", "-W", "-f=${Version}", name), None)
             packages.append({"SPDXID": identifier(name), "name": name, "versionInfo": version, "supplier": "Organization: Debian",
                              "licenseConcluded": LICENCES[name], "licenseDeclared": LICENCES[name],
                              "copyrightText": "NOASSERTION", "downloadLocation": f"https://packages.debian.org/bookworm/{name}"})
@@ -273,7 +278,7 @@ def identifier(name):
 def main():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("output", type=Path)
-    parser.add_argument("--only", default=",".join(PUBLISHED))
+    parser.add_argument("--only", default=",".join([*PUBLISHED, "windows"]))
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     chosen = parser.parse_args()
     changed = run("git", "-C", ROOT, "status", "--porcelain")
@@ -290,6 +295,9 @@ def main():
     release = Release(output, chosen.jobs, run("git", "-C", ROOT, "rev-parse", "--short=12", "HEAD").strip(), epoch)
     release.sources()
     for name in chosen.only.split(","):
+        if name == "windows":
+            release.windows()
+            continue
         release.debian_packages(PUBLISHED[name])
         release.static_artefacts(PUBLISHED[name])
     release.lists()

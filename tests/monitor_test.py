@@ -17,13 +17,13 @@ KEYS = " q quit  p pause  z zero  c clear  tab next  e errors  h help"
 class Terminal:
     """A tmux terminal that runs `absenc monitor`."""
 
-    def __init__(self, case, *arguments, columns=80, rows=24, environment=""):
+    def __init__(self, case, *arguments, columns=80, rows=24, environment="", program=(ABSENC,)):
         self.case = case
         # number in the names of this terminal's files, because a test may open several terminals
         number = len(os.listdir(case.directory))
         self.socket = os.path.join(case.directory, f"tmux-{number}")
         self.status = os.path.join(case.directory, f"status-{number}")
-        command = f"env {environment} {shlex.join([ABSENC, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
+        command = f"env {environment} {shlex.join([*program, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
         self.tmux("-f", "/dev/null", "new-session", "-d", "-x", str(columns), "-y", str(rows), command)
         case.addCleanup(self.tmux, "kill-server")
 

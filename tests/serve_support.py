@@ -70,9 +70,9 @@ class Stream:
 
 
 class Server:
-    def __init__(self, *arguments, preexec_fn=None, within=(), **environment):
+    def __init__(self, *arguments, preexec_fn=None, within=(), program=ABSENC, **environment):
         where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
-        command = [*within, ABSENC, "serve", *arguments, *where]
+        command = [*within, program, "serve", *arguments, *where]
         self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                         preexec_fn=preexec_fn, env={**os.environ, **environment})
         line = read_line(self.process.stdout, time.monotonic() + PATIENCE)

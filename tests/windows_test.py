@@ -2,20 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests absenc.exe under wine: COM ports that lead to pseudo-terminals, TCP, files, the console. ABSENC is the command
 for Linux, ABSENC_EXE the one for Windows."""
+import contextlib
 import itertools
 import json
 import os
 import re
 import select
+import shlex
 import signal
+import socket
+import sqlite3
+import struct
 import subprocess
+import sys
 import threading
 import time
 import tty
 import unittest
+import zipfile
+
+import h5py
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line
+from decode_file_test import conversation
+from monitor_test import Terminal
+from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
+from serve_support import TOKEN, Server, Stream, of, wait_until
 from wine_support import WINE, Prefix
 
 EXE = os.path.abspath(os.environ.get("ABSENC_EXE", "build/windows/bin/absenc.exe"))
@@ -121,16 +134,10 @@ class Basics(WindowsCase):
         self.assertEqual(windows("list", "--json").stdout, absenc("list", "--json").stdout)
 
     def test_parts_that_are_left_out_say_so(self):
-        self.assert_failed(windows("serve"), "`absenc serve` is not in this build", "docs/windows.md")
-        self.assert_failed(windows("record", "sim:tformat", "--output", self.dos("a.h5"), "--count", "1"),
-                           "writing HDF5 is not in this build", "docs/windows.md")
         self.assert_failed(windows("read", "ssi:spi:/dev/spidev0.0"), "SPI controller", "which Windows does not have")
         can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
         self.assert_failed(windows("read", f"{can}:can0"), "which Windows does not have", "slcan:COM5")
         self.assert_failed(windows("emulate", "tformat"), "Windows has no pseudo-terminals", "--tcp")
-        lines = windows("monitor", "sim:tformat", "--for", "1.5")
-        self.assert_good(lines)
-        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
 
     def test_output_to_a_full_disk_fails(self):
         with open("/dev/full", "wb") as full:
@@ -156,30 +163,6 @@ class Ports(WindowsCase):
         lines = json_lines(windows("read", address.lower(), "--json", "--count", "50", "--rate", "0").stdout)
         self.assertEqual({(line["ok"], line["singleturn"]) for line in lines}, {(True, 65536)})
         self.assertEqual(len(lines), 50)
-
-    # A pseudo-terminal has no parity, and wine no rate above 4 Mbit/s, so some units are read over TCP here.
-    REFUSED_AT_COM = {"esl": "cannot do 10000000 baud", "hiperface": "even parity", "nikon": "16-bit characters"}
-
-    def test_reads_with_every_serial_unit(self):
-        read = []
-        for name in character_units():
-            with self.subTest(name):
-                plain = absenc("emulate", name, "--for", "0.001", "--pty", self.file(name))
-                if plain.returncode != 0:
-                    self.assertIn("sim:", plain.stderr)  # a pulse asks for its frames, which no port here carries
-                    continue
-                emulator = Emulator(self.directory, "--tcp", "0", protocol=name, name=name)
-                self.addCleanup(emulator.end)
-                tcp = emulator.line().removeprefix("ready: ").strip()
-                rate = "&baud=9600" if "states no baud rate" in absenc("read", f"{name}:/dev/none").stderr else ""
-                at_com = windows("read", f"{name}:{self.com(emulator.path)}?latency=300{rate}", "--json")
-                if name in self.REFUSED_AT_COM:
-                    self.assertIn(self.REFUSED_AT_COM[name], json.loads(at_com.stdout)["message"])
-                else:
-                    self.assert_good(at_com)
-                self.assert_good(windows("read", f"{name}:{tcp}", "--json"))
-                read.append(name)
-        self.assertGreater(len(read), 5)
 
     def test_silence_is_a_timeout_with_its_evidence(self):
         result = windows("read", self.at_com("--fault", "silence=1", latency=20))
@@ -221,6 +204,7 @@ class Ports(WindowsCase):
 
     def test_direction_by_rts_is_refused_where_the_driver_cannot(self):
         self.assert_failed(windows("read", self.at_com() + "&rs485=on"), "cannot switch the direction of RS-485 by RTS")
+        self.assert_failed(windows("read", self.at_com() + "&rs485=rts"), "has no RTS line to switch the direction")
 
     def test_ports_lists_what_windows_lists(self):
         subprocess.run([WINE, "reg", "add", r"HKLM\HARDWARE\DEVICEMAP\SERIALCOMM", "/v", r"\Device\Absenc0", "/d",
@@ -410,47 +394,573 @@ class Commands(WindowsCase):
         self.assertEqual(silent.returncode, 1)
         self.assertIn("no_answer", silent.stdout)
 
-    def test_conform_of_serial_units(self):
-        for name in ("tformat", "encolink", "esl", "amt21"):
+
+class SerialUnits(WindowsCase):
+    """Every unit with a serial line, at a COM port where wine can carry its line there, and over TCP."""
+
+    # A pseudo-terminal has no parity, and no UART has characters of 16 bits.
+    REFUSALS = "no parity|even parity|odd parity|16-bit characters"
+
+    def rate(self, unit):
+        """Returns the setting of the rate at a COM port: some units have none of their own, and wine has none above
+        4 Mbit/s."""
+        rate = unit["line"]["rate"]
+        return "&baud=9600" if rate is None else "&baud=2500000" if rate > 4_000_000 else ""
+
+    def emulated(self, name, unit):
+        """Starts Linux's emulator of a unit and returns its addresses for absenc.exe, at a COM port (None if wine cannot
+        carry its line there) and over TCP."""
+        emulator = Emulator(self.directory, "--tcp", "0", protocol=name, name=name)
+        self.addCleanup(emulator.end)
+        tcp = f"{name}:{emulator.line().removeprefix('ready: ').strip()}?latency=100"
+        com = f"{name}:{self.com(emulator.path)}?latency=100{self.rate(unit)}"
+        refused = windows("read", com)
+        if refused.returncode == 0:
+            return com, tcp
+        self.assertRegex(refused.stderr, self.REFUSALS)
+        return None, tcp
+
+    def test_absenc_exe_reads_the_encoders_of_linux(self):
+        at_com = []
+        for name, unit in character_units().items():
             with self.subTest(name):
-                rate = "&baud=2500000" if name == "esl" else ""
-                result = windows("conform", self.at_com(protocol=name, latency=100) + rate, "--readings", "3",
-                                 timeout=3 * PATIENCE)
-                self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+                com, tcp = self.emulated(name, unit)
+                for address in filter(None, (com, tcp)):
+                    readings = json_lines(windows("read", address, "--json", "--count", "3").stdout)
+                    self.assertEqual([reading["ok"] for reading in readings], [True] * 3, readings)
+                at_com += [name] * (com is not None)
+        self.assertGreater(len(at_com), 5)
+
+    def assert_conforms(self, result):
+        self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+        self.assertIn("kept: ", result.stdout)
+
+    def test_encoders_of_linux_keep_the_clauses_for_absenc_exe(self):
+        for name, unit in character_units().items():
+            with self.subTest(name):
+                com, tcp = self.emulated(name, unit)
+                self.assert_conforms(windows("conform", com or tcp, "--readings", "3", timeout=3 * PATIENCE))
+
+    def test_encoders_of_absenc_exe_keep_the_clauses_for_linux(self):
+        for name, unit in character_units().items():
+            with self.subTest(name):
+                encoder = self.begin("emulate", name, "--tcp", "0")
+                place = re.search(r"tcp:[\d.:]+", read_line(encoder.stdout, time.monotonic() + PATIENCE))[0]
+                self.assert_conforms(absenc("conform", f"{name}:{place}?latency=100", "--readings", "3",
+                                            timeout=3 * PATIENCE))
+                self.assertEqual(end(encoder, signal.SIGINT)[0], 0)
+
+    def verdicts(self, address):
+        result = absenc("conform", address, "--readings", "3", "--json", timeout=3 * PATIENCE)
+        return {one["id"]: one["verdict"] for one in json.loads(result.stdout)["clauses"]}
+
+    def test_encoders_of_absenc_exe_are_judged_as_those_of_linux_at_a_com_port(self):
+        """The cable carries no rate, so a clause about a request at a wrong rate is broken with both."""
+        at_com = []
+        for name, unit in character_units().items():
+            rate = self.rate(unit)
+            with self.subTest(name), Cable() as cable:
+                encoder = self.begin("emulate", name, "--port", f"{self.com(cable.paths[0])}?{rate[1:]}".rstrip("?"))
+                if read_line(encoder.stdout, time.monotonic() + PATIENCE) is None:
+                    self.assertRegex(end(encoder)[2], self.REFUSALS)
+                    continue
+                there = self.verdicts(f"{name}:{cable.paths[1]}?latency=100{rate}")
+                self.assertEqual(end(encoder, signal.SIGINT)[0], 0)
+                folder, port = os.path.split(cable.paths[0])
+                with Emulator(folder, protocol=name, line="--port", name=f"{port}?latency=100{rate}"):
+                    here = self.verdicts(f"{name}:{cable.paths[1]}?latency=100{rate}")
+                self.assertEqual(there, here)
+                self.assertIn("kept", there.values())
+                at_com.append(name)
+        self.assertGreater(len(at_com), 5)
+
+    def test_hosts_keep_the_clauses(self):
+        """The host of Linux at the judge of absenc.exe, and the other way round."""
+        seen = 0
+        for name in character_units():
+            for judged, judge in ((absenc, self.begin), (windows, self.start)):
+                with self.subTest(f"{name}, judged by {judge.__name__}"):
+                    process = judge("conform-host", name, "--tcp", "0", "--answers", "3", "--patience", "1", "--json")
+                    place = None
+                    while place is None:
+                        line = read_line(process.stderr, time.monotonic() + PATIENCE)
+                        self.assertIsNotNone(line)
+                        place = re.search(r"tcp:[\d.:]+", line)
+                        if "is asked nothing" in line:
+                            break
+                    if place is None:
+                        process.communicate(timeout=PATIENCE)
+                        self.assertEqual(process.returncode, 2)
+                        continue
+                    judged("read", f"{name}:{place[0]}?latency=100", "--count", "30", "--rate", "0")
+                    out, messages = process.communicate(timeout=PATIENCE)
+                    verdicts = {one["id"]: one["verdict"] for one in json.loads(out)["clauses"]}
+                    self.assertEqual((process.returncode, verdicts["asks"]), (0, "kept"), f"{verdicts}\n{messages}")
+                    seen += 1
+        self.assertGreater(seen, 10)
+
+    def test_encoder_and_port_follow_a_new_rate(self):
+        """Of every unit with such a setting: after it the encoder answers at the new rate only."""
+        changed = 0
+        for name, unit in character_units().items():
+            option = next((one for one in unit["options"] if one.get("role") == "rate"), None)
+            commands = {command["name"] for command in unit["commands"]}
+            if option is None or f"set-{option['name']}" not in commands:
+                continue
+            with self.subTest(name):
+                com, _ = self.emulated(name, unit)
+                if com is None:
+                    continue
+                new = next(value for value in reversed(option["choices"]) if value != option["default"])
+                self.assert_good(windows("config", "set", com, option["name"], new, "--yes"))
+                old = windows("read", com)
+                self.assertEqual(old.returncode, 1, old.stdout)
+                self.assert_good(windows("read", f"{com}&{option['name']}={new}"))
+                changed += 1
+        self.assertGreater(changed, 0)
+
+
+class Recordings(WindowsCase):
+    def test_full_disk(self):
+        """Uses a file system of 1 MB in a namespace of its own, and a wine prefix in there, because wine's server opens
+        all files."""
+        folder, messages = self.file("disk"), self.file("messages")
+        os.mkdir(folder)
+        shell = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--mount"]
+        support = os.path.join(os.path.dirname(os.path.abspath(__file__)), "wine_support.py")
+        for ending in ("csv", "jsonl"):
+            with self.subTest(ending):
+                copy = self.file(f"copy.{ending}")
+                script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$2" -B "$3" "$4" "$5" record sim:tformat '
+                          '--rate 0 --output "Z:$1/log.$8" 2>"$6"; echo "status $?"; cp "$1/log.$8" "$7"')
+                result = subprocess.run([*shell, "sh", "-c", script, "sh", folder, sys.executable, support, WINE, EXE,
+                                         messages, copy, ending], stdin=subprocess.DEVNULL, capture_output=True,
+                                        text=True, timeout=5 * PATIENCE, check=False)
+                self.assertEqual((result.returncode, result.stdout), (0, "status 1\n"), result.stderr)
+                with open(messages, encoding="utf-8") as file:
+                    text = file.read()
+                self.assert_sentence(text, "No space left on device", "what is written so far is whole")
+                with open(copy, encoding="utf-8") as file:
+                    written = file.read()
+                self.assertTrue(written.endswith("\n"))
+                self.assertGreater(len(written), 2**20 - 3 * 4096)
+                readings = int(re.search(r"(\d+) readings", text)[1])
+                rows = [line for line in written.splitlines() if line[0] in ("{" if ending == "jsonl" else "0123456789")]
+                self.assertGreaterEqual(len(rows), readings)  # a gap has a row, too
+
+    def test_unplugged_and_back(self):
+        number = next(numbers)
+        path = self.file("log.csv")
+
+        def wait_for(event):
+            deadline = time.monotonic() + PATIENCE
+            while True:
+                with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8") as file:
+                    rows = [line.split(",") for line in file.read().splitlines() if line[:1].isdigit()]
+                    if any(event(row) for row in rows):
+                        return
+                if time.monotonic() > deadline:
+                    self.fail(f"in vain waited for it: {end(process)}")
+
+        first = Emulator(self.directory, "--singleturn", "1000")
+        prefix.link_port(number, first.path)
+        self.addCleanup(prefix.link_port, number, None)
+        process = self.begin("record", f"tformat:COM{number}?latency=300", "--output", self.dos("log.csv"), "--rate", "50")
+        wait_for(lambda row: row[2] == "1000")
+        prefix.link_port(number, None)
+        first.kill()
+        first.process.communicate()
+        wait_for(lambda row: row[-1] == "lost")
+        with Emulator(self.directory, "--singleturn", "2000", name="again") as again:
+            prefix.link_port(number, again.path)
+            wait_for(lambda row: row[2] == "2000")
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("went away", messages)
+        self.assertIn("the port is back after", messages)
+
+
+class Library(WindowsCase):
+    """The archive with the C++ library, in a project that finds it with find_package."""
+
+    PROJECT = """
+cmake_minimum_required(VERSION 3.25)
+project(outside LANGUAGES CXX)
+find_package(absenc {version} REQUIRED)
+add_executable(outside outside.cpp)
+target_link_libraries(outside PRIVATE absenc::configuration absenc::captures absenc::recording)
+target_link_options(outside PRIVATE -static)
+"""
+    # Reads the first argument, records an encoder that absenc.toml names, and decodes a capture.
+    PROGRAM = r"""
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/configuration.hpp"
+#include "absenc/client/decode.hpp"
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/recording.hpp"
+
+using namespace absenc;
+
+int main(int, char** arguments) try {
+  client::Encoder encoder = client::open(arguments[1]);
+  std::printf("%u\n", static_cast<unsigned>(encoder.read().singleturn));
+  client::Encoder elbow = client::open("elbow");
+  client::Recording recording({.path = arguments[2], .encoder = "elbow", .count = 3}, elbow);
+  std::printf("%d\n", recording.run());
+  for (const client::Row& row : client::decode(arguments[3], "tformat")) {
+    std::printf("%s\n", client::to_text(row.values[0]).c_str());
+    break;
+  }
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
+"""
+
+    def run_here(self, *command):
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=5 * PATIENCE,
+                              check=False)
+        self.assert_good(done)
+
+    def test_program_finds_the_library_and_reads(self):
+        root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+        with open(os.path.join(root, "VERSION"), encoding="utf-8") as file:
+            version = file.read().strip()
+        name = f"absenc-{version}-windows-x64-dev"
+        with zipfile.ZipFile(os.path.join(os.path.dirname(os.path.dirname(EXE)), f"{name}.zip")) as archive:
+            archive.extractall(self.directory)
+        self.file("CMakeLists.txt", self.PROJECT.format(version=version))
+        self.file("outside.cpp", self.PROGRAM)
+        self.run_here("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
+                      "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
+                      "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
+        self.run_here("cmake", "--build", self.file("build"))
+        com = self.at_com("--singleturn", "65536")
+        port = re.search(r"COM\d+", com)[0]
+        self.file("absenc.toml", f'[encoder.elbow]\nprotocol = "tformat"\nport = "{port}"\nlatency = 300\n')
+        self.file("wave.vcd", conversation(3).vcd())
+        environment = {name: value for name, value in prefix.environment.items() if name != "ABSENC_CONFIG"}
+        for address, position in (("sim:tformat?singleturn=1234", 1234), (com, 65536)):
+            result = subprocess.run([WINE, self.file("build/outside.exe"), address, self.dos(f"{position}.csv"),
+                                     self.dos("wave.vcd")], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                    env=environment, cwd=self.directory, timeout=PATIENCE, check=False)
+            self.assert_good(result)
+            self.assertEqual(result.stdout.splitlines()[:2], [str(position), "1"])
+            self.assertEqual(len(result.stdout.splitlines()), 3)
+            with open(self.file(f"{position}.csv"), encoding="utf-8") as file:
+                self.assertIn(",65536,", file.read())
 
 
 class Captures(WindowsCase):
     def test_decodes_as_on_linux(self):
-        frames = self.file("Rahmen ä.txt", FRAMES)
-        files = [frames]
-        for ending in ("vcd", "csv"):
-            files.append(self.file(f"Welle ü.{ending}"))
-            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", files[-1], "--count", "20"))
-        for file in files:
+        """Every format: bytes as text, VCD, CSV, sessions of sigrok, raw samples, Saleae's export as a file and as a
+        folder, a log of candump."""
+        wave = conversation(20, bad=(7,))
+        can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
+        frames, vcd, csv, session, log = (self.file(f"Mitschnitt ä.{ending}")
+                                          for ending in ("txt", "vcd", "csv", "sr", "log"))
+        self.file(os.path.basename(frames), FRAMES)
+        self.file(os.path.basename(vcd), wave.vcd())
+        for file in (csv, session):
+            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", file, "--count", "20"))
+        self.assert_good(absenc("read", f"sim:{can}?log={log}", "--count", "5"))
+        samples, saleae, folder = self.file("Werte ü.bin"), self.file("digital_0.bin"), self.file("Export ö")
+        os.mkdir(folder)
+        with open(samples, "wb") as file:
+            file.write(wave.samples("D0", 50))
+        changes = [(at * 1e-9, level) for at, level in wave.changes["D0"]]
+        export = b"<SALEAE>" + struct.pack("<iiIddQ", 0, 0, changes[0][1], 0, changes[-1][0] + 1e-4, len(changes) - 1)
+        export += struct.pack(f"<{len(changes) - 1}d", *(at for at, _ in changes[1:]))
+        for path in (saleae, os.path.join(folder, "digital_0.bin")):
+            with open(path, "wb") as file:
+                file.write(export)
+        for file, protocol, *more in ((frames, "tformat"), (vcd, "tformat"), (csv, "tformat"), (session, "tformat"), (log, can),
+                                      (samples, "tformat", "--raw-channels", "1", "--rate", "20000000"),
+                                      (saleae, "tformat"), (folder, "tformat")):
             with self.subTest(file):
-                there = windows("decode", "tformat", "Z:" + file, "--json")
-                here = absenc("decode", "tformat", file, "--json")
-                self.assertEqual(there.stdout, here.stdout)
+                there = windows("decode", protocol, "Z:" + file, *more, "--json")
+                here = absenc("decode", protocol, file, *more, "--json")
+                self.assertEqual(there.stdout, here.stdout, there.stderr)
                 self.assertEqual(there.returncode, here.returncode)
-                self.assertGreater(len(here.stdout.splitlines()), 1)
+                self.assertGreater(len([line for line in json_lines(here.stdout) if line.get("fields")]), 0, here.stderr)
 
     def test_draws_the_same_waveform(self):
-        for ending in ("vcd", "csv"):
+        for ending in ("vcd", "csv", "sr"):
             self.assert_good(windows("wave", "sim:tformat", self.dos(f"dort ü.{ending}")))
             self.assert_good(absenc("wave", "sim:tformat", self.file(f"hier.{ending}")))
             with open(self.file(f"dort ü.{ending}"), "rb") as there, open(self.file(f"hier.{ending}"), "rb") as here:
                 self.assertEqual(there.read(), here.read())
 
-    def test_archives_of_sigrok_are_refused_in_words(self):
-        self.assert_good(absenc("wave", "sim:tformat", self.file("a.sr")))
-        self.assert_failed(windows("decode", "tformat", self.dos("a.sr")), "zip archive", "built without the libraries",
-                           "export VCD or CSV")
+    def test_report_of_doctor_is_read_there_and_here(self):
+        name = "Bericht für Jürgen.zip"
+        self.assert_good(windows("doctor", self.at_com(latency=100), "--report", self.dos(name)))
+        there = windows("decode", self.dos(name))
+        self.assert_good(there)
+        self.assertIn("good: ", there.stdout)
+        self.assertEqual(there.stdout, absenc("decode", self.file(name)).stdout)
 
     def test_standard_input(self):
         there = subprocess.run([WINE, EXE, "decode", "tformat", "-", "--json"], input=FRAMES.encode(),
                                capture_output=True, env=prefix.environment, timeout=PATIENCE, check=False)
         self.assertEqual(there.stdout.decode(), absenc("decode", "tformat", self.file("frames.txt", FRAMES), "--json").stdout)
         self.assertIn(str(0x12345), there.stdout.decode())
+
+
+class Hdf5(WindowsCase):
+    def read(self, name):
+        """Returns the rows of a recording, times and positions, after a check that they fit a shaft of 60 rpm."""
+        with h5py.File(self.file(name), "r") as file:
+            good = file["event"][:] == b""
+            times, places = file["time_s"][:][good], file["position"][:][good]
+        self.assertEqual(len(times), len(places))
+        for at, place in zip(times, places):
+            self.assertAlmostEqual(place / 2**17 - at, places[0] / 2**17 - times[0], delta=0.3)
+        return times
+
+    def test_recording_is_read_by_another_program(self):
+        name = "Aufnahme für Jürgen.h5"
+        address = self.at_com("--motion", "rpm=60")
+        self.assert_good(windows("record", address, "--output", self.dos(name), "--count", "70", "--rate", "50"))
+        self.assertEqual(len(self.read(name)), 70)
+        with h5py.File(self.file(name), "r") as file:
+            self.assertEqual(file.attrs["protocol"], b"tformat")
+            self.assertEqual(file["angle_deg"].attrs["unit"], b"deg")
+        self.assert_failed(windows("record", address, "--output", self.dos(name), "--count", "1"),
+                           "there is already a file", "für Jürgen")
+
+    def test_recording_is_whole_after_a_kill(self):
+        process = self.begin("record", "sim:tformat?motion=rpm=60", "--output", self.dos("log.h5"), "--rate", "200",
+                             "--count", "0")
+
+        def rows():
+            try:
+                return len(self.read("log.h5"))
+            except (OSError, KeyError, IndexError):  # the file is not there yet, or is changed meanwhile
+                return 0
+
+        wait_until(lambda: rows() > 300, "rows are written")
+        before = rows()
+        end(process, signal.SIGKILL)
+        self.assertGreaterEqual(len(self.read("log.h5")), before)
+
+
+SHAFT = "sim:tformat?motion=rpm=60"
+
+
+class Console(WindowsCase):
+    """A console of wine, which shows its content on a terminal of tmux."""
+
+    def terminal(self, address):
+        environment = shlex.join(f"{name}={prefix.environment[name]}" for name in
+                                 ("WINEPREFIX", "WINEDEBUG", "WINEDLLOVERRIDES"))
+        return Terminal(self, address, columns=100, rows=30, environment=environment, program=[WINE, EXE])
+
+    def test_screen_of_monitor(self):
+        terminal = self.terminal(self.at_com("--motion", "rpm=60", "--alarm", "over_heat"))
+        first = terminal.wait_for(r"^> tformat:COM\d+\S* +live +\d+\.\d+ (.|\n)*alarms: over_heat")
+        self.assertIn(" q quit  p pause  z zero", first)
+        position = re.search(r"live +(\d+\.\d+)", first)[1]
+        terminal.wait_for(rf"live +(?!{re.escape(position)})\d+\.\d+ ")
+        terminal.press("h")
+        terminal.wait_for("the last bad exchanges, byte by byte")
+        terminal.press("h", "p")
+        terminal.wait_for("paused")
+        terminal.press("q")
+        self.assertEqual(terminal.exit_status(), 0)
+
+    def test_monitor_prints_lines_without_a_console(self):
+        lines = windows("monitor", "sim:tformat", "--for", "1.5")
+        self.assert_good(lines)
+        self.assertIn("sim:tformat:   0.000 deg", lines.stdout)
+
+    def test_interrupt_ends_a_command(self):
+        terminal = self.terminal(SHAFT)
+        terminal.wait_for("live")
+        terminal.press("C-c")
+        self.assertEqual(terminal.exit_status(), 0)
+
+
+class Serves(WindowsCase):
+    def server(self, *arguments):
+        server = Server(*arguments, within=[WINE], program=EXE, **prefix.environment)
+        self.addCleanup(self.finish, server.process)
+        return server
+
+    @staticmethod
+    def finish(process):
+        if process.poll() is None:
+            end(process)
+        for stream in (process.stdout, process.stderr):
+            stream.close()
+
+    @staticmethod
+    def seconds(server):
+        """Returns the times of all seconds in the history of the encoder; none while a damaged one is replaced."""
+        now = int(time.time())
+        status, text = server.ask(of(SHAFT, "history"), **{"from": now - 600, "to": now, "rows": 1000})
+        return [row[0] for row in json.loads(text)["rows"]] if status == 200 else []
+
+    def test_api_events_and_ctrl_c(self):
+        server = self.server(SHAFT, "--history", "none")
+        self.assertEqual(server.url, f"http://127.0.0.1:{server.port}/")
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        stream = Stream(server, SHAFT)
+        self.addCleanup(stream.close)
+        places = [stream.next() for _ in range(5)]
+        self.assertEqual(len(places), 5)
+        self.assertIn("absenc_readings_total", server.ask("/metrics")[1])
+        status, _, messages = end(server.process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("Ctrl-C ends\n", messages)
+
+    def test_reads_encoders_at_com_ports(self):
+        address = self.at_com("--singleturn", "65536")
+        server = self.server(address, "--history", "none")
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        busy = self.server(SHAFT, "--history", "none")
+        taken = windows("serve", SHAFT, "--history", "none", "--listen", f"127.0.0.1:{busy.port}")
+        self.assert_failed(taken, "is in use by another program")
+
+    def test_page_in_a_browser(self):
+        from page_scenes import Browser  # is here, because only this test needs selenium
+        server = self.server(SHAFT, self.at_com("--singleturn", "65536"), "--history", self.dos("Seite ü.sqlite"))
+        browser = Browser()
+        self.addCleanup(browser.driver.quit)
+        browser.go(server.url)
+        wait_until(lambda: "tformat" in browser.ask("return document.body.innerText"), "the page names the encoders")
+        shown = "return [...document.querySelectorAll('.card')].map((card) => card.innerText)"
+        first = wait_until(lambda: len(browser.ask(shown)) == 2 and browser.ask(shown), "the page has both encoders")
+        wait_until(lambda: browser.ask(shown)[0] != first[0], "the angle of the shaft changes on the page")
+        wait_until(lambda: "180.0" in browser.ask(shown)[1], "the page shows the encoder at the COM port")
+        problems = [line for line in browser.driver.get_log("browser") if line["level"] == "SEVERE"]
+        self.assertEqual(problems, [])
+
+    def test_history_is_whole_after_a_kill(self):
+        path = self.file("Verlauf für Jürgen.sqlite")
+        arguments = [SHAFT, "--history", self.dos(os.path.basename(path))]
+        server = self.server(*arguments)
+        before = wait_until(lambda: len(rows := self.seconds(server)) >= 4 and rows, "four seconds are written")
+        self.assertEqual(before, list(range(before[0], before[-1] + 1)))
+        second = windows("serve", *arguments, "--listen", "127.0.0.1:0")
+        self.assert_failed(second, "another server keeps its history in")
+        server.process.kill()
+        server.process.wait()
+        again = self.server(*arguments)
+        after = wait_until(lambda: (rows := self.seconds(again))[-1:] > before[-1:] and rows, "the history goes on")
+        self.assertEqual(after[:len(before)], before)
+        self.assertEqual(end(again.process, signal.SIGINT)[0], 0)
+        with sqlite3.connect(path) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+            written = [at for at, in database.execute("SELECT at FROM second ORDER BY at")]
+        self.assertEqual(written[:len(before)], before)
+
+    def test_damaged_history_is_set_aside(self):
+        path = self.file("history.sqlite")
+        server = self.server(SHAFT, "--history", self.dos("history.sqlite"))
+        wait_until(lambda: self.seconds(server), "a second is written")
+        with open(path, "r+b") as file:
+            file.write(b"no database" * 1000)
+        wait_until(lambda: any(".damaged-" in name for name in os.listdir(self.directory)), "the file is renamed")
+        wait_until(lambda: self.seconds(server), "a new history begins")
+        wait_until(lambda: "a new one begins" in json.dumps(server.json("/api/events")), "the new history says so")
+
+    def test_usual_history_is_in_the_local_folder_of_the_user(self):
+        environment = {name: value for name, value in prefix.environment.items()
+                       if name not in ("STATE_DIRECTORY", "XDG_STATE_HOME")}
+        server = Server(SHAFT, within=[WINE], program=EXE, **environment)
+        self.addCleanup(end, server.process)
+        wait_until(lambda: self.seconds(server), "a second is written")
+        self.assertTrue(os.path.exists(os.path.join(prefix.user_folder("Local"), "absenc", "history.sqlite")))
+
+    def test_tokens_that_others_may_read_are_refused(self):
+        path = self.file("Schlüssel.txt", f"anna {TOKEN}\n")
+        address = self.at_com()
+        arguments = [address, "--history", "none", "--token-file", self.dos("Schlüssel.txt")]
+        os.chmod(path, 0o644)
+        self.assert_failed(windows("serve", *arguments, "--listen", "127.0.0.1:0"), "others may read", "icacls")
+        os.chmod(path, 0o600)
+        server = self.server(*arguments)
+        wait_until(lambda: server.encoder()["state"] == "live", "the encoder is live")
+        self.assertEqual(server.command(address, "clear-alarms", {})[0], 401)
+        status, answer = server.command(address, "clear-alarms", {"Authorization": f"Bearer {TOKEN}"})
+        self.assertEqual(status, 200, answer)
+
+    @staticmethod
+    def mqtt_processes():
+        """Returns the process numbers of the MQTT clients that servers in this prefix have started."""
+        found = []
+        for number in filter(str.isdigit, os.listdir("/proc")):
+            with contextlib.suppress(OSError):  # the process has ended, or belongs to others
+                with open(f"/proc/{number}/cmdline", "rb") as words, open(f"/proc/{number}/environ", "rb") as values:
+                    if b"serve-mqtt-client" in words.read() and prefix.folder.encode() in values.read():
+                        found.append(int(number))
+        return found
+
+    def test_mqtt_client_that_dies_is_started_again_and_ends_with_the_server(self):
+        broker = Broker(self.directory)
+        self.addCleanup(broker.end)
+        server = self.sender(broker.url)
+        mqtt = lambda: server.json("/api/mqtt")
+        wait_until(lambda: mqtt()["connected"], "the broker is connected")
+        [client] = self.mqtt_processes()
+        os.kill(client, signal.SIGKILL)
+        wait_until(lambda: mqtt()["client_deaths"] == 1 and mqtt()["connected"], "another client is connected")
+        self.assertEqual(len(self.mqtt_processes()), 1)
+        server.process.kill()
+        server.process.wait()
+        wait_until(lambda: not self.mqtt_processes(), "the client has ended")
+
+    def test_udp(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+            receiver.bind(("127.0.0.1", 0))
+            receiver.settimeout(PATIENCE)
+            self.server(SHAFT, "--history", "none", "--udp", f"127.0.0.1:{receiver.getsockname()[1]}")
+            sent = [json.loads(receiver.recv(4096)) for _ in range(10)]
+        self.assertTrue(all(SHAFT in one and one["timestamp"] > 1e9 for one in sent), sent)
+
+    def sender(self, url):
+        return self.server(SHAFT, "--history", "none", "--rate", "50", "--mqtt", url, "--mqtt-prefix", "plant/hall",
+                           "--mqtt-spool", self.dos("Warteschlange ü"))
+
+    @staticmethod
+    def taken(server):
+        """Returns the number of readings that the server has taken for MQTT."""
+        return server.json("/api/mqtt")["taken"].get(SHAFT, 0)
+
+    def test_readings_wait_for_the_broker_and_survive_a_kill(self):
+        server = self.sender(f"mqtt://127.0.0.1:{free_port()}")
+        wait_until(lambda: self.taken(server) > 100, "readings wait in the spool")
+        taken = self.taken(server)
+        server.process.kill()
+        server.process.wait()
+        broker = Broker(self.directory)
+        self.addCleanup(broker.end)
+        receiver = Receiver(broker.port, client_id="keeps")
+        self.addCleanup(receiver.end)
+        found = lambda: numbers_of(receiver.all("readings"), SHAFT)
+        server = self.sender(broker.url)
+        goal = wait_until(lambda: (now := self.taken(server)) > taken and now, "it goes on")
+        wait_until(lambda: found()[-1:] >= [goal], "all readings arrive")
+        self.assertEqual(found(), list(range(1, len(found()) + 1)))
+        broker.kill()
+        before = self.taken(server)
+        wait_until(lambda: self.taken(server) > before + 100, "two seconds wait in the spool")
+        broker.start()
+        goal = self.taken(server)
+        wait_until(lambda: found()[-1] >= goal, "readings arrive again")
+        wait_until(lambda: server.json("/api/mqtt")["waiting"] < 5, "the spool is sent")
+        self.assertEqual(server.json("/api/mqtt")["dropped"], 0)
+        second = windows("serve", SHAFT, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt", broker.url,
+                         "--mqtt-spool", self.dos("Warteschlange ü"))
+        self.assert_failed(second, "is locked: another process keeps it")
+        self.assertEqual(end(server.process, signal.SIGINT)[0], 0)
+
+    def test_mqtt_over_tls_is_refused_in_words(self):
+        result = windows("serve", SHAFT, "--history", "none", "--mqtt", "mqtts://127.0.0.1:1", "--mqtt-spool",
+                         self.dos("spool"), "--listen", "127.0.0.1:0")
+        self.assert_failed(result, "needs TLS, which is not in this build")
 
 
 if __name__ == "__main__":

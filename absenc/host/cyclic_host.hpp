@@ -362,7 +362,8 @@ bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
   if (!wants_) return false;
   Time start = std::max({now, step_.at, rested_at_});
   if (carries_) start = std::max(start, cycle_.begun);
-  const bool fits = step_.kind == Kind::configure || duration(step_) <= due_ - start;
+  // A reply that ends just when the cycle begins would be handled behind the begin.
+  const bool fits = step_.kind == Kind::configure || duration(step_) < due_ - start;
   if (!fits && !is_row_ && !takes_ && !carries_) {
     // The request can never fit between two positions if it does not fit directly behind a position.
     is_too_long_ = is_too_long_ || (now == free_since_ && step_.at <= std::max(now, rested_at_));

@@ -89,7 +89,8 @@ struct Event {
   bool held_low = false;  ///< selected on a clocked link: the clock line was held low before the transfer, not idle
   bool idle_low = false;  ///< received on a clocked link: the data line was low already before the first bit
   /// Triggered: duration of the pulse. Device side, selected (clocked) or sent (SPI): period of the clock, 0 if not
-  /// known.
+  /// known. Received, on a bidirectional clocked link: time from the edge at which the encoder changes a bit until the
+  /// port samples it, 0 for half a period.
   Time width{};
   Time lead{};  ///< sent, device side of an SPI link: time from chip select to the first clock
   /// Uncertainty of `at`: the event may have been earlier by up to this time; 0: none, or not known.

@@ -37,14 +37,13 @@ class ChildProcess {
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   [[nodiscard]] const Channel& channel() const { return channel_; }
-  [[nodiscard]] int number() const { return number_; }
   /// Waits up to `longest` for the process to end, then kills it. Returns how the process failed, for example "with
   /// status 1"; "" if it succeeded.
   std::string end(Time longest);
 
  private:
   Channel channel_;
-  int number_ = -1;
+  int number_ = -1;  // number of the process; Windows: of a descriptor of it
 };
 
 /// Returns the child's end of the channel; the child must call this first. `name`: name of the child in process

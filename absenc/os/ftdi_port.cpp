@@ -220,6 +220,7 @@ void FtdiPort::turn(const ByteStep& step, TransferResult& received) {
   bits.take_pin();
   extract(bits.bytes(), in > 1 ? 1 : 0, in, received);  // the first pulse samples before the encoder's first bit
   received.idle_low = false;
+  received.sampled_after = settings_.bits(1);
 }
 
 void FtdiPort::exchange_bytes(const ByteStep& step, TransferResult& received) {

@@ -10,9 +10,12 @@
 #include "absenc/host/drive.hpp"
 #include "absenc/os/fake_ftdi_test.hpp"
 #include "absenc/os/testing.hpp"
+#include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
 #include "absenc/protocol/biss/unit.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
+#include "absenc/protocol/endat/device.hpp"
+#include "absenc/protocol/endat/unit.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"
 #include "tests/shape_toys.hpp"
@@ -257,6 +260,27 @@ TEST_F(FtdiBothWays, ExchangeGoesOnWhileClockRestsLow) {
 TEST_F(FtdiBothWays, ExchangeMayGoOnBehindBitsOfTheHost) {
   EXPECT_EQ(received({{{0x2D}, 8, 8, true}, {{}, 0, 12}}), "91 A0 12, ");
   EXPECT_THAT(events(), HasSubstr("received 2D 8, sent 20"));
+}
+
+// Commands of EnDat with an encoder behind a long line: the port says how late it samples.
+TEST_F(FtdiEncoder, LineDelayOfEndatIsThatOfTheLine) {
+  endat::VirtualEncoder encoder({.singleturn_bits = 25}, shaft);
+  encoder.power_on(Time{}, skip);
+  constexpr LineSettings settings{.rate = 1'000'000, .spi_mode = 3};
+  ftdi::EncoderWires wires(LinkKind::clocked_bidirectional, settings, encoder);
+  FakeFtdi usb(wires);
+  FtdiPort port("", LinkKind::clocked_bidirectional, settings, {}, usb);
+  const Options options = author::testing::options_of(endat::unit, "singleturn_bits=25 clock_khz=2000 latency_us=5");
+  for (const int delay : {700, 1200}) {
+    wires.fault.delay = Time(delay);
+    const author::testing::Talk<std::uint8_t> talk(endat::unit, options, "line-delay");
+    ASSERT_TRUE(run(*talk, port));
+    author::testing::RunResult result;
+    result.take(*talk);
+    ASSERT_EQ(result.error, Error::none) << result.detail;
+    // The divider makes periods in steps of 33 ns.
+    EXPECT_NEAR(static_cast<double>(result.numbers.at("line_delay_ns")), delay, 34);
+  }
 }
 
 // EnDat's encoders need up to 0.2 us, and a cable adds 10 ns for each metre both ways.

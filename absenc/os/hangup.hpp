@@ -6,7 +6,8 @@
 
 namespace absenc::os {
 
-/// Returns a descriptor that is readable after SIGHUP. Call it before other threads are started. Throws Failure.
+/// Returns a descriptor that is readable after SIGHUP; none on Windows, which has no such signal. Call it before other
+/// threads are started. Throws Failure.
 [[nodiscard]] Descriptor catch_hangups();
 
 /// Takes pending SIGHUPs out of the descriptor. Returns false if none was pending.

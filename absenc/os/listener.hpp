@@ -21,10 +21,13 @@ struct Listener {
 /// Failure.
 [[nodiscard]] Listener listen_at(const std::string& host, std::uint16_t port);
 
+/// Gives up ownership of the socket of a Listener, and returns its number for libraries, one of which must close it.
+[[nodiscard]] int release_socket(Descriptor& socket);
+
 /// Returns the IP address in `address` as text, "127.0.0.1"; "" if it is no internet address.
 [[nodiscard]] std::string host_text(const sockaddr& address);
 
-/// Shuts down the connection of `socket`, which stays open until its owner closes it.
+/// Shuts down the connection of `socket`, a number of a library, which stays open until its owner closes it.
 void end_connection(int socket);
 
 }  // namespace absenc::os

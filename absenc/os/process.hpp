@@ -26,6 +26,13 @@ void write_standard_error(std::string_view bytes);
 /// Returns whether the descriptor of a standard stream, 0 to 2, is a terminal.
 [[nodiscard]] bool is_terminal(int descriptor);
 
+/// The terminal of this process, as a library that draws on it must know it.
+struct TerminalKind {
+  const char* name = nullptr;  // null: the library finds it in the environment variable TERM
+  bool has_faint_text = true;
+};
+[[nodiscard]] TerminalKind terminal_kind();
+
 /// Returns the words of the command line in UTF-8, from the parameters of `main`.
 [[nodiscard]] std::vector<std::string> command_words(int count, char** words);
 

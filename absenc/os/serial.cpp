@@ -2,10 +2,12 @@
 // The parts of a serial port that are the same on all systems.
 #include "absenc/os/serial.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <string_view>
 
 #include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::os {
 
@@ -27,7 +29,7 @@ std::string_view name_of(Parity parity) {
 
 bool SerialPort::uses_rts(const PulseWires& wires, Rs485 rs485) {
   const bool uses = wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
-  if (uses && rs485 == Rs485::on) {
+  if (uses && (rs485 == Rs485::on || rs485 == Rs485::rts)) {
     throw Failure(Failure::Kind::unsupported,
                   std::string("RTS cannot switch the direction of RS-485 and carry pulses: use DTR ") +
                       (has_gpio_lines() ? "or a GPIO line " : "") + "for them");
@@ -64,6 +66,34 @@ void SerialPort::apply(const LineSettings& settings) {
 void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
   if (wires.trigger.kind != PulseWire::Kind::none) trigger_.emplace(wires.trigger, descriptor(), path_, kernel);
   if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
+}
+
+void SerialPort::switch_by_rts(WireKernel& kernel) {
+  if (kernel.set_modem_line(descriptor(), ModemLine::rts, false) < 0) {
+    throw Failure(Failure::Kind::unsupported,
+                  "the port " + path_ +
+                      " has no RTS line to switch the direction of RS-485: use an adapter that does "
+                      "it by itself, without rs485=rts");
+  }
+  rts_ = &kernel;
+  set_leaving(Leaving::in_write);
+}
+
+void SerialPort::write_all(Bytes bytes) {
+  if (rts_ == nullptr) return DescriptorPort::write_all(bytes);
+  const Time begun = os::now();
+  if (rts_->set_modem_line(descriptor(), ModemLine::rts, true) < 0) fail(errno);
+  try {
+    DescriptorPort::write_all(bytes);
+    wait_until_sent();
+    // A driver that is done before the characters can have left has passed them to the adapter, which sends them now.
+    const Time duration = character_time() * static_cast<std::int64_t>(bytes.size());
+    if (const Time done = os::now(); done < begun + duration) os::reach(done + duration);
+  } catch (...) {
+    rts_->set_modem_line(descriptor(), ModemLine::rts, false);
+    throw;
+  }
+  if (rts_->set_modem_line(descriptor(), ModemLine::rts, false) < 0) fail(errno);
 }
 
 void SerialPort::drive(ExtraWire wire, bool active) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A serial port of Linux: UARTs, USB adapters, and pseudo-terminals of virtual encoders.
+// A serial port: UARTs, USB adapters, and pseudo-terminals of virtual encoders.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/link/line.hpp"
@@ -22,7 +24,12 @@ enum class Rs485 : std::uint8_t {
   automatic,
   on,   // the kernel switches the transceiver; opening throws `unsupported` if the port cannot do it
   off,  // the kernel never switches the transceiver; for full-duplex lines
+  // The port itself sets RTS before it sends, and clears it when the last character has left; for drivers that cannot
+  // do it. Opening throws `unsupported` if the port has no RTS.
+  rts,
 };
+/// Names of the values, in their order, as an address has them.
+inline constexpr std::array<std::string_view, 4> rs485_names{"auto", "on", "off", "rts"};
 
 /// Directions in which a port is used.
 enum class SerialUse : std::uint8_t {
@@ -50,6 +57,7 @@ class SerialPort final : public DescriptorPort {
   void drive(ExtraWire wire, bool active) override;
   [[nodiscard]] Time pulse_width(ExtraWire wire, Time requested) const override;
   void change_rate(std::uint32_t rate) override;
+  void write_all(Bytes bytes) override;
 
   [[nodiscard]] const std::optional<PulseOutput>& pulse_output(ExtraWire wire) const {
     return wire == ExtraWire::trigger ? trigger_ : clear_;
@@ -62,13 +70,19 @@ class SerialPort final : public DescriptorPort {
   /// Returns the end of the error for a rate that the driver has refused: which rate it set, and what to try.
   [[nodiscard]] std::string rate_instead(std::uint32_t requested, std::uint32_t given) const;
   void lock() const;
+  /// Makes the driver switch the direction as `rs485` says.
   void set_direction(Rs485 rs485);
+  /// Sets RTS before and clears it after each write, by `kernel`. Throws Failure if the port has no RTS.
+  void switch_by_rts(WireKernel& kernel);
+  /// Waits until the driver reports that it has sent all bytes.
+  void wait_until_sent();
   void take_wires(const PulseWires& wires, WireKernel& kernel);
   void shorten_latency();
 
   std::string path_;
   bool pseudo_ = false;
   bool kernel_direction_ = false;
+  WireKernel* rts_ = nullptr;  // sets RTS before and clears it after each write; null: nothing does
   TerminalState before_{};
   LineSettings line_{};
   std::optional<PulseOutput> trigger_;

@@ -46,11 +46,13 @@ void StreamPort::transfer(const ByteStep& step) {
 }
 
 void StreamPort::write(std::span<const std::uint8_t> out) {
-  const Time before = os::now();
+  const Time before = std::max(os::now(), sent_at_);
   if (!out.empty()) write_all(out);
-  const Time written = read_at_once_ ? before : os::now();
-  const Time begun = std::max(written, sent_at_);
-  mark_sent(begun + character_time_ * static_cast<std::int64_t>(out.size()), begun - std::max(before, sent_at_));
+  const Time after = leaving_ == Leaving::from_write ? before : std::max(os::now(), before);
+  const Time duration = character_time_ * static_cast<std::int64_t>(out.size());
+  const Time earliest = before + duration;
+  const Time latest = leaving_ == Leaving::in_write ? std::max(after, earliest) : after + duration;
+  mark_sent(latest, latest - earliest);
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {

@@ -48,9 +48,14 @@ class StreamPort : public Port<std::uint8_t> {
 
   /// Sets the duration of a character, from which the time of `sent` is computed. Default 0.
   void set_character_time(Time time) { character_time_ = time; }
-  /// Sets whether the time of a transfer is counted from the time before its write(2); else from the time after it.
-  /// Default false.
-  void set_read_at_once(bool yes) { read_at_once_ = yes; }
+  /// When the characters of a transfer leave.
+  enum class Leaving : std::uint8_t {
+    after_write,  // from the end of `write_all` on
+    from_write,   // from the beginning of `write_all` on
+    in_write,     // before `write_all` returns
+  };
+  /// Sets from when on the time of a transfer is counted. Default `after_write`.
+  void set_leaving(Leaving leaving) { leaving_ = leaving; }
   [[nodiscard]] Time end() const { return end_; }
   /// Returns the end of the last transfer or pulse, as computed from the duration of its characters.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
@@ -82,7 +87,7 @@ class StreamPort : public Port<std::uint8_t> {
   Time send_slack_{};
   Time end_ = never;
   Time character_time_{};
-  bool read_at_once_ = false;
+  Leaving leaving_ = Leaving::after_write;
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};  // time at which the last transfer or pulse ends

@@ -55,7 +55,8 @@ ByteEvent TransferPort::wait(const ByteStep& step) {
                             .at = received_.at,
                             .items = received_.items,
                             .bits = kind_ == LinkKind::clocked_bidirectional ? received_.bits : 0,
-                            .idle_low = received_.idle_low});
+                            .idle_low = received_.idle_low,
+                            .width = received_.sampled_after});
   }
   sleep_until(waiting_.due());
   return waiting_.take_due(std::max(os::now(), waiting_.due())).value();

@@ -34,7 +34,10 @@ class TransferPort : public Port<std::uint8_t> {
     std::vector<std::uint8_t> items{};
     std::size_t bits = 0;   // number of bits of a clocked link
     bool idle_low = false;  // whether the data line was low in all idle clocks; false if there were none
-    Time at{};              // time at which the transfer ended; it may have ended up to `late` earlier
+    // bidirectional clocked link: time from the edge at which the encoder changes a bit until it is sampled; 0: half a
+    // period
+    Time sampled_after{};
+    Time at{};  // time at which the transfer ended; it may have ended up to `late` earlier
     Time late{};
   };
 

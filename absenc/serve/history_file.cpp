@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "absenc/os/file_name.hpp"
+
 namespace absenc::serve {
 
 using namespace client;
@@ -43,12 +45,12 @@ std::unique_ptr<os::OwnedFile> lock(const std::string& path) {
 
 void remove_if_same(const std::string& path, const os::FileIdentity& identity) {
   std::error_code ignored;
-  if (identity.number != 0 && os::identity_of(path) == identity) std::filesystem::remove(path, ignored);
+  if (identity.number != 0 && os::identity_of(path) == identity) std::filesystem::remove(os::path_of(path), ignored);
 }
 
 void rename_to(const std::string& path, const std::string& name) {
   std::error_code error;
-  std::filesystem::rename(path, name, error);
+  std::filesystem::rename(os::path_of(path), os::path_of(name), error);
   if (error) throw Failure(fmt::format("the history {} cannot be renamed to {}: {}", path, name, error.message()));
 }
 
@@ -142,9 +144,11 @@ void HistoryFile::close_moved() {
 }
 
 std::string HistoryFile::set_aside() {
-  const std::string name = set_aside(path_);
+  sqlite_->keep_log_on_close();
+  sqlite_.reset();  // on Windows, SQLite's open files cannot be renamed
+  std::string name = set_aside(path_);
   remove_if_same(index_of(path_), index_);
-  close();
+  owned_file_.reset();
   return name;
 }
 

@@ -41,6 +41,7 @@ TEST(ClockWatch, DetectsJumpsButIgnoresNtpAdjustments) {
 
 std::string new_path() { return testing::TempDir() + "absenc-history-" + std::to_string(std::random_device()()); }
 
+// Windows removes no open file, so the history must be closed before.
 void remove_history(const std::string& path) {
   for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(path + ending);
 }
@@ -68,15 +69,17 @@ TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
     for (std::int64_t i = 0; i < 60; ++i) seconds.push_back(second_of("two", now - i));
     writer.write(seconds, {});
   }
-  HistoryWriter writer(path, {});
-  writer.trim();
-  EXPECT_EQ(seconds_in(writer, "one"), 100U);
-  std::vector<HistoryWriter::Entry> hours;
-  for (std::int64_t i = 1; i <= 24; ++i) hours.push_back(second_of("two", calendar_ms() / 1000 - i * 3600));
-  writer.write(hours, {});
-  writer.trim();
-  EXPECT_EQ(seconds_in(writer, "one"), 0U);
-  EXPECT_EQ(seconds_in(writer, "two"), 84U);
+  {
+    HistoryWriter writer(path, {});
+    writer.trim();
+    EXPECT_EQ(seconds_in(writer, "one"), 100U);
+    std::vector<HistoryWriter::Entry> hours;
+    for (std::int64_t i = 1; i <= 24; ++i) hours.push_back(second_of("two", calendar_ms() / 1000 - i * 3600));
+    writer.write(hours, {});
+    writer.trim();
+    EXPECT_EQ(seconds_in(writer, "one"), 0U);
+    EXPECT_EQ(seconds_in(writer, "two"), 84U);
+  }
   remove_history(path);
 }
 
@@ -92,8 +95,10 @@ TEST(History, DeletesOldestTenthOfRowsBeyondSizeLimit) {
     seconds.push_back(second_of("one", 3'000'000'000));
     writer.write(seconds, {});
   }
-  HistoryWriter writer(path, limits);
-  EXPECT_EQ(seconds_in(writer, "one"), 9000U);
+  {
+    HistoryWriter writer(path, limits);
+    EXPECT_EQ(seconds_in(writer, "one"), 9000U);
+  }
   remove_history(path);
 }
 

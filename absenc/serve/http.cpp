@@ -50,7 +50,7 @@ std::string peer_of(MHD_Connection* connection) {
 
 int socket_of(MHD_Connection* connection) {
   const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-  return info != nullptr ? info->connect_fd : -1;
+  return info != nullptr ? static_cast<int>(info->connect_fd) : -1;
 }
 
 Request request_of(MHD_Connection* connection, const char* path, const char* method) {
@@ -367,14 +367,14 @@ struct HttpServer::Daemon {
   }
 
   void start() {
+    const auto socket = static_cast<MHD_socket>(os::release_socket(listener.socket));  // libmicrohttpd closes it
     daemon = ::MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr, nullptr, &access, this,
-        MHD_OPTION_LISTEN_SOCKET, listener.socket.get(), MHD_OPTION_CONNECTION_LIMIT, most_connections,
+        MHD_USE_AUTO | MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr, nullptr,
+        &access, this, MHD_OPTION_LISTEN_SOCKET, socket, MHD_OPTION_CONNECTION_LIMIT, most_connections,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each, MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds,
         MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
-    static_cast<void>(listener.socket.release());  // from here on, libmicrohttpd owns the listening socket
   }
 
   // libmicrohttpd must not be stopped while connections are suspended.

@@ -38,7 +38,9 @@ std::string printable(std::string text) {
 std::string Broker::text() const { return fmt::format("{}://{}:{}", tls ? "mqtts" : "mqtt", host, port); }
 
 MqttClient::MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version)
-    : process_({"absenc", std::string(mqtt_process_verb)}), incoming_(most_in_frame), last_frame_at_(os::now()) {
+    : process_({"absenc", "serve", std::string(mqtt_process_word)}),
+      incoming_(most_in_frame),
+      last_frame_at_(os::now()) {
   WireFrame frame(Wire::begin);
   frame.add(broker.host).add(broker.port).add(broker.tls ? 1U : 0U);
   for (const auto* file : {&broker.login_file, &broker.ca_file, &broker.cert_file, &broker.key_file}) frame.add(*file);

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <memory>
 #include <string>
 #include <unordered_map>
@@ -17,6 +16,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/child_process.hpp"
+#include "absenc/os/network.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/mqtt_client.hpp"
 #include "absenc/serve/mqtt_wire.hpp"
@@ -44,7 +44,7 @@ constexpr Time sign_of_life_interval = 1s;
 
 void require(int error, const std::string& what) {
   if (error == MOSQ_ERR_SUCCESS) return;
-  throw Failure(what + ": " + (error == MOSQ_ERR_ERRNO ? std::strerror(errno) : ::mosquitto_strerror(error)));
+  throw Failure(what + ": " + (error == MOSQ_ERR_ERRNO ? os::socket_error_text(errno) : ::mosquitto_strerror(error)));
 }
 
 /// The MQTT client process, with one connection to a broker.
@@ -68,7 +68,8 @@ class MqttProcess {
  private:
   // Waits for the parent and the broker, and exchanges data with both. Returns false when the parent has ended.
   bool wait_and_exchange() {
-    const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
+    broker_socket_.watch(client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_));
+    const int broker = broker_socket_.descriptor();
     const bool reads = outgoing_.size() < outgoing_limit;
     const bool writes = broker >= 0 && ::mosquitto_want_write(client_);
     std::array<os::Watched, 2> watched{
@@ -141,9 +142,14 @@ class MqttProcess {
     }
     if (broker_.tls) {
       const char* file = or_null(broker_.ca_file);
-      require(::mosquitto_tls_set(client_, file, file == nullptr ? system_certificates : nullptr,
-                                  or_null(broker_.cert_file), or_null(broker_.key_file), nullptr),
-              "the files for TLS to " + broker_.text());
+      const int error = ::mosquitto_tls_set(client_, file, file == nullptr ? system_certificates : nullptr,
+                                            or_null(broker_.cert_file), or_null(broker_.key_file), nullptr);
+      if (error == MOSQ_ERR_NOT_SUPPORTED) {
+        throw Failure(broker_.text() +
+                      " needs TLS, which is not in this build of absenc: use mqtt:// in a network that "
+                      "you trust");
+      }
+      require(error, "the files for TLS to " + broker_.text());
     }
     const auto size = static_cast<int>(identity.will.size());
     require(::mosquitto_will_set(client_, identity.will_topic.c_str(), size, identity.will.data(), 1, true),
@@ -210,7 +216,7 @@ class MqttProcess {
   void note(int error) {
     connects_ = true;
     if (error == MOSQ_ERR_SUCCESS) return;
-    lose(error == MOSQ_ERR_ERRNO && errno != 0 ? std::strerror(errno) : ::mosquitto_strerror(error));
+    lose(error == MOSQ_ERR_ERRNO && errno != 0 ? os::socket_error_text(errno) : ::mosquitto_strerror(error));
   }
 
   void lose(const std::string& why, bool wrong_version = false) {
@@ -247,6 +253,7 @@ class MqttProcess {
   mosquitto* client_ = nullptr;
   // Numbers that the parent process has given to messages; the keys are libmosquitto's numbers of the messages.
   std::unordered_map<int, std::uint32_t> numbers_{};
+  os::LibrarySocket broker_socket_{};
   os::Ready broker_ready_{};
   Time next_sign_of_life_{};
   bool connects_ = false;

@@ -4,21 +4,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/text_file.hpp"
+#include "absenc/os/private_file.hpp"
 
 namespace absenc::serve {
 
 using namespace client;
 
 std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least) {
-  namespace fs = std::filesystem;
   const std::string text = read_text_file("the " + title + "s", path);
-  const fs::perms others = fs::status(path).permissions() & (fs::perms::group_write | fs::perms::others_all);
-  if (others != fs::perms::none) {
-    throw Failure(fmt::format("others may read or write the {}s in {}: chmod 600 {}", title, path, path));
+  if (const std::string command = os::command_to_deny_others(path); !command.empty()) {
+    throw Failure(fmt::format("others may read or write the {}s in {}: {}", title, path, command));
   }
   std::vector<Secret> secrets;
   for (SignificantLines lines(text); lines.next();) {

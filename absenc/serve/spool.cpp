@@ -9,6 +9,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/file_name.hpp"
 
 namespace absenc::serve {
 
@@ -163,7 +164,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
     } catch (const os::Failure&) {
       std::error_code error;
       // A file of the spool cannot be read. If it still exists, the error may be temporary, so its messages stay.
-      if (fs::exists(path_of(part.number), error)) break;
+      if (fs::exists(os::path_of(path_of(part.number)), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
   }

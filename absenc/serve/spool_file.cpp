@@ -9,6 +9,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/serve/fields.hpp"
 
 namespace absenc::serve {
@@ -75,7 +76,7 @@ std::string spool_record_without(std::string_view encoder) {
 SpoolFile::SpoolFile(const std::string& path, const SpoolFacts& facts) : log_(path, os::LogFile::Open::fresh) {
   if (const int error = log_.append(spool_head(facts)); error != 0) {
     std::error_code ignored;
-    std::filesystem::remove(path, ignored);
+    std::filesystem::remove(os::path_of(path), ignored);
     throw os::system_failure("writing " + path, error);
   }
 }

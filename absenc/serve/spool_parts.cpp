@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "absenc/os/error.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/serve/spool.hpp"
 
 namespace absenc::serve {
@@ -20,7 +21,7 @@ constexpr std::string_view part_suffix = ".part";
 // a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
-  const std::uintmax_t free = fs::space(folder, error).available;
+  const std::uintmax_t free = fs::space(os::path_of(folder), error).available;
   const std::int64_t share = error || free > 1'000'000'000 ? most : static_cast<std::int64_t>(free);
   return static_cast<std::size_t>(std::clamp<std::int64_t>(std::min(most, share) / 32, 32'000, 4'000'000));
 }
@@ -30,15 +31,16 @@ std::size_t part_bytes(std::int64_t most, const std::string& folder) {
 // A regular file at the path of the spool folder is renamed: it may be a spool of an older absenc, or no spool.
 void Spool::open_folder() {
   std::error_code error;
-  if (fs::exists(path_, error) && !fs::is_directory(path_, error)) set_aside(path_);
+  const fs::path path = os::path_of(path_);
+  if (fs::exists(path, error) && !fs::is_directory(path, error)) set_aside(path_);
   folder_.emplace(path_);
 }
 
 void Spool::load() {
   std::vector<std::int64_t> numbers;
   std::error_code error;
-  for (fs::directory_iterator entry(path_, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string stem = entry->path().stem();
+  for (fs::directory_iterator entry(os::path_of(path_), error), end; !error && entry != end; entry.increment(error)) {
+    const std::string stem = os::name_of(entry->path().stem());
     const bool is_number = !stem.empty() && stem.size() < 18 &&
                            std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
     if (entry->path().extension() == part_suffix && is_number) numbers.push_back(std::stoll(stem));
@@ -146,7 +148,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   }
   if (part.damaged) return set_aside(path_of(part.number));
   std::error_code ignored;
-  fs::remove(path_of(part.number), ignored);
+  fs::remove(os::path_of(path_of(part.number)), ignored);
 }
 
 // The messages of the file that cannot be read are reported as dropped.
@@ -208,8 +210,8 @@ std::string Spool::path_of(std::int64_t number) const { return fmt::format("{}/{
 void Spool::set_aside(const std::string& path) {
   std::error_code error;
   std::string to = path + ".bad";
-  for (int i = 2; fs::exists(to, error); ++i) to = fmt::format("{}.bad{}", path, i);
-  fs::rename(path, to, error);
+  for (int i = 2; fs::exists(os::path_of(to), error); ++i) to = fmt::format("{}.bad{}", path, i);
+  fs::rename(os::path_of(path), os::path_of(to), error);
   const std::lock_guard lock(shown_mutex_);
   notes_.push_back(error ? fmt::format("{} cannot be read, nor renamed: {}", path, error.message())
                          : fmt::format("{} was no file of the spool, or damaged: it was renamed to {}", path, to));

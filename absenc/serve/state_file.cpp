@@ -3,30 +3,24 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/file_name.hpp"
+#include "absenc/os/user_folders.hpp"
 
 namespace absenc::serve {
 
 std::string state_file(std::string_view name, std::string_view option) {
-  namespace fs = std::filesystem;
-  const auto variable = [](const char* wanted) {
-    const char* value = std::getenv(wanted);
-    return value == nullptr ? std::string() : std::string(value);
-  };
-  fs::path folder = variable("STATE_DIRECTORY");
-  if (folder.empty() && !variable("XDG_STATE_HOME").empty()) folder = fs::path(variable("XDG_STATE_HOME")) / "absenc";
-  if (folder.empty() && !variable("HOME").empty()) folder = fs::path(variable("HOME")) / ".local/state/absenc";
+  std::string folder = os::environment("STATE_DIRECTORY");  // systemd sets it for a service
+  if (folder.empty()) folder = os::state_folder();
   if (folder.empty()) throw client::UsageError(fmt::format("no folder for {} is known: set {}", name, option));
   std::error_code error;
-  fs::create_directories(folder, error);
+  std::filesystem::create_directories(os::path_of(folder), error);
   if (error) {
-    throw client::Failure(
-        fmt::format("the folder {} for {} cannot be made: {}", folder.string(), name, error.message()));
+    throw client::Failure(fmt::format("the folder {} for {} cannot be made: {}", folder, name, error.message()));
   }
-  return folder / name;
+  return os::name_of(os::path_of(folder) / os::path_of(name));
 }
 
 }  // namespace absenc::serve

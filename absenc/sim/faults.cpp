@@ -131,7 +131,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
       reply_.erase(first, std::min(first + static_cast<std::ptrdiff_t>(each), reply_.end()));
     }
     if (strikes(FaultKind::garbage)) {
-      for (std::uint64_t more = each * (1 + random_.below(4)); more > 0; --more) {
+      for (std::size_t more = each * (1 + random_.below(4u)); more > 0; --more) {
         reply_.insert(reply_.begin(), static_cast<std::uint8_t>(random_.below(256)));
       }
     }
@@ -149,10 +149,10 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
 }
 
 void flip_bits(std::span<std::uint8_t> bytes, Random& random) {
-  std::array<std::uint64_t, 3> flipped{};
-  const std::uint64_t count = 1 + random.below(flipped.size());
-  for (std::uint64_t i = 0; i < count;) {
-    const std::uint64_t bit = random.below(bytes.size() * 8);
+  std::array<std::size_t, 3> flipped{};
+  const std::size_t count = 1 + random.below(flipped.size());
+  for (std::size_t i = 0; i < count;) {
+    const std::size_t bit = random.below(bytes.size() * 8);
     if (std::find(flipped.begin(), flipped.begin() + static_cast<std::ptrdiff_t>(i), bit) !=
         flipped.begin() + static_cast<std::ptrdiff_t>(i)) {
       continue;

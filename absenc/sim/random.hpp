@@ -2,6 +2,7 @@
 // A small pseudo-random generator (splitmix64) with the same numbers on every platform.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 
 namespace absenc::sim {
@@ -22,13 +23,15 @@ class Random {
   }
 
   /// Returns a number from 0 to limit - 1, each equally likely; `limit` must not be 0.
-  constexpr std::uint64_t below(std::uint64_t limit) {
+  template <std::unsigned_integral T>
+  constexpr T below(T limit) {
     // Rejects the lowest 2^64 mod `limit` values, which would make some results more likely.
-    const std::uint64_t uneven = (0 - limit) % limit;
+    const std::uint64_t uneven = (0 - std::uint64_t{limit}) % limit;
     std::uint64_t value = next();
     while (value < uneven) value = next();
-    return value % limit;
+    return static_cast<T>(value % limit);
   }
+  constexpr std::uint64_t below(int limit) { return below(static_cast<std::uint64_t>(limit)); }
 
   /// Returns true with the given probability: 0 never, 1 always.
   constexpr bool chance(double probability) { return static_cast<double>(next() >> 11) * 0x1p-53 < probability; }

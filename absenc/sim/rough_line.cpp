@@ -354,14 +354,14 @@ bool RoughLine<Item>::flip_bits(std::vector<Item>& items, std::size_t count) {
   std::size_t at = 0;
   bool any = false;
   while (skip_ < count - at) {
-    at += skip_;
+    at += static_cast<std::size_t>(skip_);
     flip(items, at++);
     any = true;
     draw_skip();
   }
   if (skip_ != ~std::uint64_t{0}) skip_ -= count - at;
   if (rates_.burst <= 0 || !random_.chance(rates_.burst)) return any;
-  const std::size_t length = std::min<std::size_t>(count, 2 + random_.below(15));
+  const std::size_t length = std::min<std::size_t>(count, 2 + random_.below(15u));
   const std::size_t first = random_.below(count - length + 1);
   for (std::size_t i = 0; i < length; ++i) {
     if (i == 0 || i + 1 == length || random_.below(2) != 0) flip(items, first + i);

@@ -173,9 +173,9 @@ class Uart(EncoderCase):
         self.assertEqual(end(reader, signal.SIGINT)[0], 0)
 
     def test_rs485(self):
-        """The 16550 has no RS-485 mode. The option rs485=on must fail, and the default must still work."""
+        """The 16550 has no RS-485 mode. The option rs485=on must fail; the others work, also RTS by absenc itself."""
         self.emulator("--singleturn", "1000", baud=115200)
-        for choice in ("auto", "off"):
+        for choice in ("auto", "off", "rts"):
             result = self.read(f"baud=115200&rs485={choice}", "--json")
             self.assert_good(result)
             self.assertEqual(json.loads(result.stdout)["singleturn"], 1000)

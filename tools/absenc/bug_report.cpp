@@ -135,7 +135,7 @@ BugReport make_report(const EncoderAddress& address, const Examination& examinat
 
 void write_report(const std::string& path, const BugReport& report) {
   try {
-    capture::ZipWriter archive(path);
+    capture::ZipWriter archive(os::path_of(path));
     archive.add(about_file, report.summary);
     archive.add(doctor_file, report.doctor);
     archive.add(exchanges_file, report.exchanges);

@@ -137,7 +137,7 @@ int run_command_line(std::span<char*> words, std::string& understood) {
   const Subcommand* subcommand = find_verb(words, understood);
   if (subcommand == nullptr) return exit_good;
   const std::optional<Invocation> invocation = parse_arguments(*subcommand, words.subspan(1));
-  if (invocation && !subcommand->program.empty()) start_program(*subcommand, all);
+  if (invocation && !subcommand->program.empty()) return run_program(*subcommand, all);
   if (invocation) return run(*subcommand, *invocation);
   print_line(help(*subcommand));
   return exit_good;

@@ -18,12 +18,15 @@ inline constexpr std::string_view hdf5_package = "absenc-hdf5";
 /// Returns the path at which the part `name` belongs: lib/absenc/NAME beside the folder of the command.
 [[nodiscard]] std::string path_of_part(std::string_view name);
 
-/// Replaces this process by the program that runs the verb, and passes it the same command-line words. Throws Failure
-/// if the program is not installed.
-[[noreturn]] void start_program(const Subcommand& subcommand, std::span<char* const> words);
+/// Throws the Failure that the part at `path`, of the Debian package `package`, is not there. `purpose`: what needs it.
+[[noreturn]] void report_missing(std::string_view purpose, std::string_view path, std::string_view package);
 
-/// Loads the plug-in for HDF5, so that recordings can be written with it. Throws Failure if it is not installed or of
-/// another version.
+/// Runs the program of the verb with the same command-line words: replaces this process by it, or returns its exit
+/// status where it is a part of this program. Throws Failure if it is not installed.
+[[nodiscard]] int run_program(const Subcommand& subcommand, std::span<char* const> words);
+
+/// Loads the plug-in for HDF5 unless HDF5 is a part of this program, so that recordings can be written with it. Throws
+/// Failure if it is not installed or of another version.
 void load_hdf5();
 
 }  // namespace absenc::tool

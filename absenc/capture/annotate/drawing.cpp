@@ -193,7 +193,9 @@ void Drawing::rewind_changes() {
 
 bool Drawing::next_change(Tick& at, std::size_t& wire) {
   std::uint64_t later = 0;
-  if (!get_number(changes_.get(), later) || !get_number(changes_.get(), wire)) return check(changes_.get()), false;
+  std::uint64_t index = 0;
+  if (!get_number(changes_.get(), later) || !get_number(changes_.get(), index)) return check(changes_.get()), false;
+  wire = static_cast<std::size_t>(index);
   at = last_change_ += later;
   return true;
 }
@@ -207,8 +209,8 @@ bool Drawing::next_label(Tick& at, std::string& words) {
   std::uint64_t later = 0;
   std::uint64_t size = 0;
   if (!get_number(labels_.get(), later) || !get_number(labels_.get(), size)) return check(labels_.get()), false;
-  words.resize(size);
-  if (std::fread(words.data(), 1, size, labels_.get()) != size) return check(labels_.get()), false;
+  words.resize(static_cast<std::size_t>(size));
+  if (std::fread(words.data(), 1, words.size(), labels_.get()) != words.size()) return check(labels_.get()), false;
   at = last_label_ += later;
   return true;
 }
@@ -253,7 +255,7 @@ void write_saleae_csv(std::ostream& out, Drawing& drawing) {
   }
 }
 
-void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate) {
+void write_sigrok(const std::filesystem::path& path, Drawing& drawing, std::uint64_t rate) {
   ZipWriter archive(path);
   Samples samples(drawing, rate);
   archive.add("version", "2");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <iosfwd>
 #include <memory>
@@ -105,6 +106,6 @@ void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
 /// Writes `drawing` as a sigrok session with `rate` samples per second, at most 1 GHz. Replaces the file at `path`.
 /// Throws std::runtime_error, and exceptions of the function set by `Drawing::watch`.
-void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate);
+void write_sigrok(const std::filesystem::path& path, Drawing& drawing, std::uint64_t rate);
 
 }  // namespace absenc::capture

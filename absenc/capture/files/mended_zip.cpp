@@ -41,15 +41,15 @@ struct Header {
   std::uint64_t size = 0;
   std::uint64_t packed = 0;
 
-  [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, number(bytes, 26, 2)); }
-  [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(number(bytes, 28, 2)); }
+  [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, length_at(bytes, 26)); }
+  [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(length_at(bytes, 28)); }
 
   // Reads the local header at offset `at`; returns false if there is none that can be used.
   [[nodiscard]] bool read(Source& source, std::uint64_t at) {
     bytes.resize(local_bytes);
     if (source.read(at, bytes) != local_bytes || number(bytes, 0, 4) != local_signature) return false;
     if ((number(bytes, 6, 2) & size_behind) != 0) return false;
-    bytes.resize(local_bytes + number(bytes, 26, 2) + number(bytes, 28, 2));
+    bytes.resize(local_bytes + length_at(bytes, 26) + length_at(bytes, 28));
     const auto rest = std::span(bytes).subspan(local_bytes);
     if (source.read(at + local_bytes, rest) != rest.size()) return false;
     packed = number(bytes, 18, 4);
@@ -60,7 +60,7 @@ struct Header {
 
   void read_zip64() {
     for (Bytes left = extra(); left.size() >= 4;) {
-      const std::size_t length = 4 + number(left, 2, 2);
+      const std::size_t length = 4 + length_at(left, 2);
       if (number(left, 0, 2) == 1 && length >= 20 && left.size() >= 20) {
         size = number(left, 4, 8);
         packed = number(left, 12, 8);

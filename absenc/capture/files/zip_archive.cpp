@@ -43,7 +43,7 @@ struct DirectoryEntry {
 // Replaces fields of the entry that are in the zip64 extra field, in their order.
 void take_zip64(DirectoryEntry& entry, Bytes extra) {
   while (extra.size() >= 4) {
-    const std::size_t length = std::min<std::size_t>(4 + number(extra, 2, 2), extra.size());
+    const std::size_t length = std::min(4 + length_at(extra, 2), extra.size());
     if (number(extra, 0, 2) == 1) {
       Bytes values = extra.subspan(4, length - 4);
       for (std::uint64_t* field : {&entry.size, &entry.packed, &entry.at}) {
@@ -97,9 +97,9 @@ std::optional<std::vector<DirectoryEntry>> read_directory(Source& source) {
   if (!bytes) return std::nullopt;
   std::vector<DirectoryEntry> entries;
   for (Bytes left = *bytes; left.size() >= directory_bytes;) {
-    const auto name = static_cast<std::size_t>(number(left, 28, 2));
-    const auto extra = static_cast<std::size_t>(number(left, 30, 2));
-    const std::size_t length = directory_bytes + name + extra + static_cast<std::size_t>(number(left, 32, 2));
+    const std::size_t name = length_at(left, 28);
+    const std::size_t extra = length_at(left, 30);
+    const std::size_t length = directory_bytes + name + extra + length_at(left, 32);
     if (number(left, 0, 4) != directory_signature || length > left.size()) return std::nullopt;
     DirectoryEntry entry{.name = {},
                          .flags = number(left, 8, 2),

@@ -23,4 +23,9 @@ constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size field if the 
   return load_little_endian(bytes.subspan(at, size));
 }
 
+/// Returns the length of a part, which two bytes from offset `at` on contain.
+[[nodiscard]] inline std::size_t length_at(Bytes bytes, std::size_t at) {
+  return static_cast<std::size_t>(number(bytes, at, 2));
+}
+
 }  // namespace absenc::capture::zip

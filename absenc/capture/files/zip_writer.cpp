@@ -6,21 +6,69 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
+#include <fstream>
 #include <stdexcept>
+#include <utility>
+
+#include "absenc/capture/files/source.hpp"
 
 namespace absenc::capture {
+
+namespace {
+
+std::ios::seekdir seek_direction(int origin) {
+  if (origin == ZLIB_FILEFUNC_SEEK_SET) return std::ios::beg;
+  return origin == ZLIB_FILEFUNC_SEEK_CUR ? std::ios::cur : std::ios::end;
+}
+
+// Returns functions by which minizip writes: its own open a file by a name that Windows does not take as UTF-8.
+zlib_filefunc64_def file_functions() {
+  zlib_filefunc64_def all{};
+  all.zopen64_file = [](void*, const void* path, int) -> void* {
+    auto file = std::make_unique<std::filebuf>();
+    constexpr auto mode = std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary;
+    return file->open(*static_cast<const std::filesystem::path*>(path), mode) == nullptr ? nullptr : file.release();
+  };
+  all.zread_file = [](void*, void* file, void* into, uLong size) {
+    return static_cast<uLong>(
+        static_cast<std::filebuf*>(file)->sgetn(static_cast<char*>(into), static_cast<std::streamsize>(size)));
+  };
+  all.zwrite_file = [](void*, void* file, const void* bytes, uLong size) {
+    return static_cast<uLong>(
+        static_cast<std::filebuf*>(file)->sputn(static_cast<const char*>(bytes), static_cast<std::streamsize>(size)));
+  };
+  all.ztell64_file = [](void*, void* file) {
+    return static_cast<ZPOS64_T>(
+        std::streamoff{static_cast<std::filebuf*>(file)->pubseekoff(0, std::ios::cur, std::ios::out)});
+  };
+  all.zseek64_file = [](void*, void* file, ZPOS64_T offset, int origin) {
+    const std::streamoff place =
+        static_cast<std::filebuf*>(file)->pubseekoff(static_cast<std::streamoff>(offset), seek_direction(origin));
+    return place < 0 ? -1L : 0L;
+  };
+  all.zclose_file = [](void*, void* file) {
+    const std::unique_ptr<std::filebuf> one(static_cast<std::filebuf*>(file));
+    return one->close() == nullptr ? -1 : 0;
+  };
+  all.zerror_file = [](void*, void*) { return 0; };  // each function reports its own errors
+  return all;
+}
+
+}  // namespace
 
 void ZipWriter::Close::operator()(void* archive) const { zipClose(archive, nullptr); }
 
 void ZipWriter::fail() const {
   const int error = errno;
-  throw std::runtime_error(path_ + " cannot be written: " + (error == 0 ? "unknown error" : std::strerror(error)));
+  throw std::runtime_error(name_of(path_) +
+                           " cannot be written: " + (error == 0 ? "unknown error" : std::strerror(error)));
 }
 
-ZipWriter::ZipWriter(const std::string& path) : path_(path), temporary_path_(path + ".part") {
+ZipWriter::ZipWriter(std::filesystem::path path) : path_(std::move(path)), temporary_path_(path_) {
+  temporary_path_ += ".part";
   errno = 0;
-  archive_.reset(zipOpen64(temporary_path_.c_str(), APPEND_STATUS_CREATE));
+  zlib_filefunc64_def functions = file_functions();
+  archive_.reset(zipOpen2_64(&temporary_path_, APPEND_STATUS_CREATE, nullptr, &functions));
   if (archive_ == nullptr) fail();
 }
 

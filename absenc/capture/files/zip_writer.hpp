@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -13,7 +14,7 @@ namespace absenc::capture {
 /// A new archive, which appears under its name only when it is finished. All functions throw std::runtime_error.
 class ZipWriter {
  public:
-  explicit ZipWriter(const std::string& path);
+  explicit ZipWriter(std::filesystem::path path);
   ~ZipWriter();
   ZipWriter(const ZipWriter&) = delete;
   ZipWriter& operator=(const ZipWriter&) = delete;
@@ -33,8 +34,8 @@ class ZipWriter {
   struct Close {
     void operator()(void* archive) const;
   };
-  std::string path_;
-  std::string temporary_path_;
+  std::filesystem::path path_;
+  std::filesystem::path temporary_path_;
   std::unique_ptr<void, Close> archive_;
   bool in_entry_ = false;
 };

@@ -149,7 +149,8 @@ void write_drawing(const WaveChoices& choices, const std::string& path, capture:
   const FileFormat format = format_of(path);
   if (format == FileFormat::sigrok) {  // an existing file needs no removal: the sigrok writer replaces it itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
-    return capture::write_sigrok(path, drawing, choices.samples_per_second == 0 ? usual : choices.samples_per_second);
+    return capture::write_sigrok(os::path_of(path), drawing,
+                                 choices.samples_per_second == 0 ? usual : choices.samples_per_second);
   }
   os::NewFile file(path);
   std::ofstream out(os::path_of(file.path()), std::ios::binary);

@@ -253,6 +253,17 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
     });
     all.push_back([=](Encoder& one) { one.damaged_at = at; });
   }
+  // Spoiling a byte of the memory breaks no clause about a setting that is not in the memory.
+  const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
+  for (const unsigned window : {30u, 1000u}) {
+    for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
+      all.push_back([=](Encoder& one) {
+        one.ignored_from = from;
+        // the encoder ignores more requests than a host sends when it repeats one request
+        one.ignored_until = from + window;
+      });
+    }
+  }
   const bool of_memory = clause.demand < Demand::set || loses(clause.demand);
   for (unsigned change = 1; change <= 12 && of_memory && !by_itself; ++change) {
     all.push_back([=](Encoder& one) {
@@ -265,17 +276,6 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       all.push_back([=](Encoder& one) {
         one.change = change;
         one.spoil = [at](MutableBytes now, const ByteList&) { now[at] ^= 0x55; };
-      });
-    }
-  }
-  // Spoiling a byte of the memory breaks no clause about a setting that is not in the memory.
-  const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
-  for (const unsigned window : {30u, 1000u}) {
-    for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
-      all.push_back([=](Encoder& one) {
-        one.ignored_from = from;
-        // the encoder ignores more requests than a host sends when it repeats one request
-        one.ignored_until = from + window;
       });
     }
   }

@@ -387,6 +387,29 @@ TEST(Doctor, TakesTheUnitsExplanationThatMostRepliesHave) {
   EXPECT_THAT(hasty.findings.at(0).action, HasSubstr("latency_us"));
 }
 
+// A host of EnDat repeats a damaged position at once, so each reading is good.
+TEST(Doctor, RepeatedRequestsOnALineThatTurnsAreFindings) {
+  const std::vector<std::pair<std::string, std::string>> faults{{"corrupt", "damaged_bits"},
+                                                                {"echo", "damaged_bursts"},
+                                                                {"garbage", "damaged_bursts"},
+                                                                {"silence", "sometimes_silent"},
+                                                                {"request_corrupt", "sometimes_silent"}};
+  for (const std::string model : {"asked", "ECN-1325", "EQN-1337", "ECN-1313"}) {
+    for (const auto& [fault, found] : faults) {
+      const Examination examination =
+          examine_sim("sim:endat?model=" + model + "&singleturn=1383&fault=" + fault + "=0.1");
+      EXPECT_THAT(ids(examination), Contains(found)) << model << ' ' << fault << ": " << examination.verdict();
+    }
+  }
+}
+
+TEST(Doctor, PositionsOfAnAskedResolutionAreNotDamaged) {
+  const Examination examination = examine_with("endat:ftdi", [](const EncoderAddress&) {
+    return virtual_link(parse_address("sim:endat?model=EQN-1337&singleturn=1383&alarm=light_source"));
+  });
+  EXPECT_EQ(ids(examination), (std::vector<std::string>{"clock_range", "alarm", "alarm"})) << examination.verdict();
+}
+
 // ---- Healthy encoders
 
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {

@@ -70,23 +70,26 @@ class Examiner {
         series(count, limit), [&] { return attempt_reading(command); }, into);
   }
 
-  /// Takes readings as `read` does and adds them to `seen`. On a line of characters it also adds the failed requests
-  /// that a reading repeated, and evidence of damaged, missing or doubled frames in a stream.
+  /// Takes readings as `read` does and adds them to `seen`. On a line of characters, and on a clocked line whose data
+  /// turns, it also adds the failed requests that a reading repeated. On a line of characters it adds evidence of
+  /// damaged, missing or doubled frames in a stream, too.
   void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       read(command, count, limit, seen.readings);
     } else {
       const std::size_t before = seen.readings.size();
-      std::vector<Attempted> failed;  // failed requests of the present reading
+      std::vector<Attempted> requests;  // requests of the present reading that were to be answered
+      Options known = options_;         // options of the encoder, with what the last reading showed of it
       StreamBytes stream;
-      const Hook hook(*this, [&](const LineExchange<Item>& line) { record_failure(line, failed); });
+      const Hook hook(*this, [&](const LineExchange<Item>& line) { record_request(line, requests); });
       const auto attempt = [&] {
-        failed.clear();
+        requests.clear();
         Attempted one = attempt_reading(command);
+        if (one.reading && unit_.learned != nullptr) known = unit_.learned(options_, *one.reading);
         // The failure of the last request is already part of the reading, so it is not stored a second time as a
         // repeated request.
-        if (!failed.empty() && failed.back().began == runner_.last().sent_at) failed.pop_back();
-        std::ranges::move(failed, std::back_inserter(seen.repeated));
+        if (!requests.empty() && requests.back().began == runner_.last().sent_at) requests.pop_back();
+        add_failed(requests, known, seen.repeated);
         if (streams_) stream.append(runner_.last());
         return one;
       };
@@ -156,19 +159,25 @@ class Examiner {
     return one;
   }
 
-  // Adds the exchange to `failed` if its request was to be answered but was not, or if its reply has an error. Lines of
-  // characters only: on SPI a reply may answer the request before.
-  void record_failure(const LineExchange<Item>& line, std::vector<Attempted>& failed) const {
+  // Adds the exchange to `requests` if its request was to be answered by the reply that it got. On SPI a reply may
+  // answer the request before; on other clocked lines an encoder sends without a request.
+  void record_request(const LineExchange<Item>& line, std::vector<Attempted>& requests) const {
+    const bool has_characters = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
+    if (has_characters ? line.answer == Time{} : unit_.link != LinkKind::clocked_bidirectional) return;
     Attempted one;
     runner_.keep_exchange(one);
+    if (unit_.is_answered != nullptr && !unit_.is_answered(options_, one.exchange.request.frame())) return;
     one.began = line.sent_at;
-    const Frame request = one.exchange.request.frame();
-    const bool has_characters = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
-    if (!has_characters || line.answer == Time{} ||
-        (unit_.is_answered != nullptr && !unit_.is_answered(options_, request)))
-      return;
-    one.error = one.answered ? unit_.check(options_, request, one.exchange.reply.frame()) : Error::timeout;
-    if (one.error != Error::none) failed.push_back(std::move(one));
+    requests.push_back(std::move(one));
+  }
+
+  // Moves the requests without a good reply to `failed`; `known`: options of the encoder.
+  void add_failed(std::vector<Attempted>& requests, const Options& known, std::vector<Attempted>& failed) const {
+    for (Attempted& one : requests) {
+      const auto& [request, reply] = one.exchange;
+      one.error = one.answered ? unit_.check(known, request.frame(), reply.frame()) : Error::timeout;
+      if (one.error != Error::none) failed.push_back(std::move(one));
+    }
   }
 
   static constexpr unsigned pieces = 5;

@@ -132,7 +132,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   if ((!often || is_one_of_few) && is_ours) return;
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
-                             {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
+                             {fmt::format("{}", std::min<std::uint64_t>(seen.late, tried)), fmt::format("{}", tried),
                               to_text(seen.lateness), fmt::format("{}", allowance)}));
 }
 

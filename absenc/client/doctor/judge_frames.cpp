@@ -241,8 +241,8 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
 }
 
 // Counts the damaged frames of a stream that were discarded without making a reading fail.
-std::size_t unreported(const std::vector<Attempted>& readings) {
-  std::size_t count = 0;
+std::uint64_t unreported(const std::vector<Attempted>& readings) {
+  std::uint64_t count = 0;
   for (const Attempted& one : readings) {
     count += one.discarded - std::min<std::uint64_t>(one.discarded, is_damaged(one) ? 1 : 0);
   }
@@ -257,7 +257,10 @@ All heard(const std::vector<Attempted>& attempts) {
   return all;
 }
 
-bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
+// A clocked line always delivers bits, so a constant level counts as silence.
+bool is_silent(const Attempted& one) {
+  return one.error != Error::none && (!one.heard || one.error == Error::line_stuck);
+}
 
 // Returns whether the reply is shorter than each good reply: this computer may have read the end of it too late.
 bool is_cut(const Observations& seen, const Attempted& attempt) {
@@ -270,13 +273,15 @@ bool is_cut(const Observations& seen, const Attempted& attempt) {
 // all, because then late replies may have collided with the next requests.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
-  std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
+  std::erase_if(all, [&](const Attempted* attempt) {
+    return is_silent(*attempt) || is_refusal(*attempt) || has_good_part(one, *attempt);
+  });
   const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.repeated, is_silent));
   return silent >= all.size() ? All{} : all;
 }
 
 Finding some_damage(const Case& one, const All& all) {
-  const std::size_t more = unreported(one.seen.readings);
+  const std::uint64_t more = unreported(one.seen.readings);
   std::vector<std::string> values{fmt::format("{}", all.size() + more),
                                   fmt::format("{}", one.seen.readings.size() + one.seen.repeated.size() + more),
                                   errors_of(all)};
@@ -408,8 +413,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
-  // A clocked line always delivers bits, so a constant level counts as silence.
-  const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
+  std::erase_if(all, [](const Attempted* attempt) { return is_silent(*attempt); });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
   };
@@ -425,9 +429,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     findings.push_back(contradiction(one, all));
     all.clear();
   }
-  const std::size_t silent =
-      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
-                                              std::ranges::count_if(one.seen.repeated, is_silent));
+  const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
+                                               std::ranges::count_if(one.seen.repeated, is_silent));
   if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
     findings.push_back(std::move(*two));
   } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
@@ -448,7 +451,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     const bool are_cut = std::ranges::all_of(all, [&](const Attempted* attempt) { return is_cut(one.seen, *attempt); });
     if (!are_cut || !may_be_the_computer(one.seen, both.size())) findings.push_back(some_damage(one, both));
   }
-  const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
+  const std::uint64_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may collide with the next request, so that the next reading fails as well.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));

@@ -18,7 +18,7 @@ struct Case {
 };
 
 /// Returns whether `some` late or missing replies may be due to this computer, because it was busy.
-[[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
+[[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::uint64_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr Time very_late = std::chrono::milliseconds(50);
   constexpr std::size_t many = 20;

@@ -121,7 +121,7 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
   for (std::size_t i = 1; i < readings.size(); ++i) {
     const double periods = static_cast<double>(distances[i - 1].count()) / static_cast<double>(period.count());
     const auto due = static_cast<std::size_t>(std::lround(periods));
-    const std::size_t come = 1 + readings[i].discarded;
+    const std::size_t come = 1 + static_cast<std::size_t>(readings[i].discarded);
     // Counts no missing frames where some were discarded as damaged: two damaged frames may have been discarded as one.
     if (due > come && readings[i].discarded == 0) missing[i] = due - come;
     // A late frame may have been counted as missing; the frames after it then seem early.

@@ -163,7 +163,7 @@ LineSearch search_of(const EncoderAddress& address) {
     search.settings.push_back(fmt::format("latency={}", ms));
   }
   if (address.port_kind == PortKind::serial && address.rs485 != os::Rs485::automatic) {
-    search.settings.emplace_back(address.rs485 == os::Rs485::on ? "rs485=on" : "rs485=off");
+    search.settings.push_back(fmt::format("rs485={}", os::rs485_names[static_cast<std::size_t>(address.rs485)]));
   }
   return search;
 }

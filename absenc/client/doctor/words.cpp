@@ -50,7 +50,7 @@ constexpr auto table = std::to_array<Words>({
     {FindingKind::direction_unswitched, "direction_unswitched", fault,
      "nothing came back, and {0} is a UART of the computer (driver {1}) whose kernel switches no direction",
      "the RS-485 transceiver is never switched to sending, or never back to receiving",
-     "use a driver or device tree that switches RTS (rs485=on), or an adapter that switches by itself"},
+     "let RTS switch it by the driver (rs485=on) or by absenc (rs485=rts), or use an adapter that switches by itself"},
 
     {FindingKind::can_bus_off, "can_bus_off", fault, "{0}", "the controller's own frames were destroyed repeatedly",
      "check the bit rate, CANH and CANL and 120 ohms at both ends, then bring the interface up again"},

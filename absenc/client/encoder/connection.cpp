@@ -338,7 +338,8 @@ class ConnectionOn final : public Connection {
   [[nodiscard]] std::string exchange(const Trouble& trouble) const {
     if (line_.clocks != 0) {
       const std::string came = line_.received.empty() ? "nothing" : trouble.received;
-      return fmt::format("{} clocks to {}; received {}", line_.clocks, link_->link().place, came);
+      const std::string sent = line_.request.empty() ? "" : fmt::format("{} and ", trouble.sent);
+      return fmt::format("sent {}{} clocks to {}; received {}", sent, line_.clocks, link_->link().place, came);
     }
     const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
     if (line_.received.empty()) {

@@ -14,6 +14,7 @@
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial.hpp"
+#include "absenc/os/serial_ports.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
 
@@ -344,8 +345,8 @@ LineSearch parse_search(std::string_view text) {
   if (first != "sim" && find_unit(first) == nullptr) return search;
   throw UsageError(
       fmt::format("\"{}\" says which protocol: `absenc read {}` reads it; to identify, give the port "
-                  "alone, as /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0 or ftdi",
-                  search.place, search.place));
+                  "alone, as {}, tcp:HOST:PORT, spi:/dev/spidev0.0 or ftdi",
+                  search.place, search.place, os::example_port()));
 }
 
 LineFindings search_line(const LineSearch& search) { return Search(search).run(); }

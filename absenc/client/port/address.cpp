@@ -74,8 +74,7 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     constexpr std::array parities{Parity::none, Parity::odd, Parity::even};
     uri.line.parity = parities[choice_of(setting, {"none", "odd", "even"})];
   } else if (setting.name == "rs485") {
-    constexpr std::array modes{os::Rs485::automatic, os::Rs485::on, os::Rs485::off};
-    uri.rs485 = modes[choice_of(setting, {"auto", "on", "off"})];
+    uri.rs485 = static_cast<os::Rs485>(choice_of(setting, os::rs485_names));
   } else if (setting.name == "latency") {
     uri.latency = std::chrono::milliseconds(number_of(setting, 0, 60'000));
   } else if (setting.name == "speed") {

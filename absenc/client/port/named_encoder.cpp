@@ -11,6 +11,7 @@
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/real_number.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/serial_ports.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -181,8 +182,8 @@ NamedEncoders require_names(std::string_view purpose) {
   const std::string_view protocol = all_units()[0]->id;
   throw UsageError(
       fmt::format("{}, and there is none: looked for {}. An encoder is named there like this:\n"
-                  "  [encoder.elbow]\n  protocol = \"{}\"\n  port = \"/dev/ttyUSB0\"",
-                  purpose, fmt::join(settings_file_paths(), " and "), protocol));
+                  "  [encoder.elbow]\n  protocol = \"{}\"\n  port = \"{}\"",
+                  purpose, fmt::join(settings_file_paths(), " and "), protocol, os::example_port()));
 }
 
 }  // namespace absenc::client

@@ -46,12 +46,11 @@ double ratio_of(const OptionText& setting) {
   return above / real_in(setting, setting.value.substr(slash + 1), most, true);
 }
 
-std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words) {
-  const auto* const found = std::find(words.begin(), words.end(), setting.value);
+std::size_t choice_of(const OptionText& setting, std::span<const std::string_view> words) {
+  const auto found = std::find(words.begin(), words.end(), setting.value);
   if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  const std::span<const std::string_view> all(words.begin(), words.size());
   throw UsageError(fmt::format("{} is \"{}\", but must be {} or {}", setting.name, setting.value,
-                               fmt::join(all.first(all.size() - 1), ", "), all.back()));
+                               fmt::join(words.first(words.size() - 1), ", "), words.back()));
 }
 
 }  // namespace absenc::client

@@ -18,6 +18,9 @@ namespace absenc::client {
 /// Parses the setting's value as a ratio, such as "12.5" or "50/3".
 [[nodiscard]] double ratio_of(const OptionText& setting);
 /// Returns the index of the word that equals the setting's value.
-[[nodiscard]] std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words);
+[[nodiscard]] std::size_t choice_of(const OptionText& setting, std::span<const std::string_view> words);
+[[nodiscard]] inline std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words) {
+  return choice_of(setting, std::span(words.begin(), words.size()));
+}
 
 }  // namespace absenc::client

@@ -22,7 +22,7 @@ struct LineExchange {
   std::vector<Item> request{};
   std::vector<Item> received{};  // received bytes or frames, including the adapter's echo of the request
   std::size_t echo = 0;          // number of bytes or frames at the beginning of `received` that are the adapter's echo
-  std::size_t clocks = 0;        // number of clocks of the transfer on a clocked line; 0 on other lines
+  std::size_t clocks = 0;        // clocked line: number of clocks of the reply; 0 on other lines
   Time answer{};                 // longest time from the end of the request to the beginning of the reply; 0: no limit
   Time sent_at{};                // time at which the last bit of the request was sent
   Time sent_late{};              // uncertainty of `sent_at`: the request may have ended earlier by up to this time
@@ -82,7 +82,7 @@ class WatchedPort final : public Port<Item> {
     if (step.kind == Kind::transfer || step.kind == Kind::pulse) {
       last.clear();
       last.request.assign(step.out.begin(), step.out.end());
-      last.clocks = step.bits;
+      last.clocks = step.bits - step.out_bits;
       last.answer = step.answer;
       ++requests;
       items_sent += step.out.size();

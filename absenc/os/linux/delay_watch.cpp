@@ -2,12 +2,12 @@
 #include "absenc/os/delay_watch.hpp"
 
 #include <poll.h>
-#include <time.h>
 
 #include <algorithm>
 #include <chrono>
 
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/timespec.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -41,7 +41,7 @@ void DelayWatch::watch(const std::stop_token& stop) {
   for (const ByteLoop& loop : loops_) watched.push_back({loop.terminal.slave.get(), POLLIN, 0});
   Time due = now() + wakeup_interval;
   while (!stop.stop_requested()) {
-    const timespec pause{0, std::max(due - now(), Time{}).count()};
+    const timespec pause = to_timespec(std::max(due - now(), Time{}));
     ::ppoll(watched.data(), watched.size(), &pause, nullptr);
     for (ByteLoop& loop : loops_) exchange(loop);
     const Time late = now() - due;

@@ -64,7 +64,7 @@ EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_po
   set_idle_latency(200us);
   // The time of a sent reply counts from before write(2), which wakes the host: the next request often arrives before
   // this program continues.
-  set_read_at_once(true);
+  set_leaving(Leaving::from_write);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
   for (const Descriptor* end : {&terminal_.master, &watch_, &listener_}) {

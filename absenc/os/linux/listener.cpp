@@ -62,6 +62,8 @@ Listener listen_at(const std::string& host, std::uint16_t port) {
   return listener;
 }
 
+int release_socket(Descriptor& socket) { return socket.release(); }
+
 std::string host_text(const sockaddr& address) {
   std::array<char, INET6_ADDRSTRLEN> text{};
   if (address.sa_family == AF_INET) {

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstring>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/linux/addresses.hpp"
@@ -44,6 +45,12 @@ Ready wait_for_socket(int socket, bool for_writing, Time longest) {
   const bool over = (watched.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
   return {over || (watched.revents & POLLIN) != 0, (watched.revents & POLLOUT) != 0};
 }
+
+void LibrarySocket::watch(int socket) { socket_ = socket; }
+
+int LibrarySocket::descriptor() const { return socket_; }
+
+std::string socket_error_text(int error) { return std::strerror(error); }
 
 std::string host_name() {
   std::array<char, 256> name{};

@@ -5,12 +5,14 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
 
 #include "absenc/os/descriptor.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/timespec.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -42,10 +44,8 @@ void Poller::State::add(int descriptor) const {
 }
 
 void Poller::State::arm(Time deadline) {
-  const auto whole = std::chrono::duration_cast<std::chrono::seconds>(deadline);
-  // An expiry time of zero would disarm the timer, so 1 ns is set instead.
   itimerspec setting{};
-  setting.it_value = {whole.count(), deadline > whole ? (deadline - whole).count() : whole.count() == 0 ? 1 : 0};
+  setting.it_value = to_timespec(std::max(deadline, Time(1)));  // an expiry time of zero would disarm the timer
   if (::timerfd_settime(timer.get(), TFD_TIMER_ABSTIME, &setting, nullptr) < 0) {
     throw system_failure("timerfd_settime", errno);
   }

@@ -62,6 +62,8 @@ void write_standard_error(std::string_view bytes) {
 
 std::vector<std::string> command_words(int count, char** words) { return {words, words + count}; }
 
+TerminalKind terminal_kind() { return {}; }
+
 bool is_terminal(int descriptor) { return ::isatty(descriptor) == 1; }
 
 Time processor_time() {

@@ -150,9 +150,30 @@ TEST_F(PulseWireTest, RefusesPulseWithoutWire) {
 }
 
 TEST_F(PulseWireTest, RtsHasOneUseOnly) {
-  const Failure failure = refused({.clear = {.kind = Wire::rts}}, Rs485::on);
+  for (const Rs485 rs485 : {Rs485::on, Rs485::rts}) {
+    const Failure failure = refused({.clear = {.kind = Wire::rts}}, rs485);
+    EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
+    EXPECT_NE(std::string(failure.what()).find("use DTR or a GPIO line"), std::string::npos);
+  }
+}
+
+TEST_F(PulseWireTest, RtsSwitchesTheDirection) {
+  SerialPort port(terminal.path, settings, Rs485::rts, {}, kernel);
+  EXPECT_EQ(kernel.log, Log{"RTS cleared"});
+  const Data request{1, 2, 3};
+  port.begin(transfer(request));
+  EXPECT_EQ(kernel.log, (Log{"RTS cleared", "RTS set", "RTS cleared"}));
+  EXPECT_EQ(get(terminal.master.get()), request);
+  kernel.modem_error = EIO;
+  EXPECT_EQ(failure_of([&] { port.begin(transfer(request)); }).kind(), Failure::Kind::lost);
+  EXPECT_EQ(get(terminal.master.get(), 0), Data{}) << "nothing may be sent against another sender";
+}
+
+TEST_F(PulseWireTest, RtsOfAPortWithoutItSwitchesNothing) {
+  kernel.modem_error = ENOTTY;
+  const Failure failure = refused({}, Rs485::rts);
   EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
-  EXPECT_NE(std::string(failure.what()).find("use DTR or a GPIO line"), std::string::npos);
+  EXPECT_NE(std::string(failure.what()).find("no RTS line"), std::string::npos);
 }
 
 // Tests the real system calls as far as possible without a wire.

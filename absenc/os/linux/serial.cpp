@@ -63,6 +63,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
       ::ioctl(descriptor(), TIOCMBIC, &rts);
     } else {
       set_direction(with_rts ? Rs485::off : rs485);
+      if (rs485 == Rs485::rts) switch_by_rts(kernel);
       take_wires(wires, kernel);
     }
   } catch (...) {
@@ -110,7 +111,7 @@ std::string SerialPort::rate_instead(std::uint32_t requested, std::uint32_t give
 void SerialPort::set_direction(Rs485 rs485) {
   serial_rs485 direction{};
   const bool known = ::ioctl(descriptor(), TIOCGRS485, &direction) == 0;
-  if (rs485 == Rs485::off) {
+  if (rs485 == Rs485::off || rs485 == Rs485::rts) {
     if (!known || (direction.flags & SER_RS485_ENABLED) == 0) return;
     direction.flags &= ~static_cast<std::uint32_t>(SER_RS485_ENABLED);
     ::ioctl(descriptor(), TIOCSRS485, &direction);
@@ -124,7 +125,13 @@ void SerialPort::set_direction(Rs485 rs485) {
   if (rs485 == Rs485::on && !kernel_direction_) {
     throw Failure(Failure::Kind::unsupported, "the driver of the port " + path_ +
                                                   " cannot switch the direction of RS-485: use an adapter that "
-                                                  "does it by itself, without asking for the kernel's help");
+                                                  "does it by itself, or rs485=rts");
+  }
+}
+
+void SerialPort::wait_until_sent() {
+  while (::tcdrain(descriptor()) < 0) {
+    if (errno != EINTR) fail(errno);
   }
 }
 

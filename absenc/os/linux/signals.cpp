@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "absenc/os/error.hpp"
+#include "absenc/os/linux/timespec.hpp"
 
 namespace absenc::os {
 
@@ -46,12 +47,7 @@ void install() {
   }
 }
 
-timespec time_left(Time deadline) {
-  using std::chrono::duration_cast, std::chrono::seconds;
-  const Time left = std::max(deadline - now(), Time{});
-  const auto whole = duration_cast<seconds>(left);
-  return {whole.count(), (left - whole).count()};
-}
+timespec time_left(Time deadline) { return to_timespec(std::max(deadline - now(), Time{})); }
 
 }  // namespace
 

@@ -58,7 +58,8 @@ EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_po
   if (!link.empty() || !tcp_port) static_cast<void>(open_terminal_pair());
   set_latency(2ms);
   set_idle_latency(200us);
-  set_read_at_once(true);  // a reply wakes the host, whose next request may arrive before this program continues
+  set_leaving(
+      Leaving::from_write);  // a reply wakes the host, whose next request may arrive before this program continues
   listen_on(*tcp_port);
   poller().add(listener_.get());
 }

@@ -161,6 +161,25 @@ DWORD PortStream::result(OVERLAPPED& operation, DWORD& size, bool waits) {
   return ::GetOverlappedResult(port_.get(), &operation, &size, waits ? TRUE : FALSE) != 0 ? 0 : ::GetLastError();
 }
 
+PipeStream::PipeStream(Handle pipe) : pipe_(std::move(pipe)) { begin(); }
+
+PipeStream::~PipeStream() {
+  drain(last_write);
+  end();
+}
+
+DWORD PipeStream::start_read(void* into, DWORD size, OVERLAPPED& operation) {
+  return ::ReadFile(pipe_.get(), into, size, nullptr, &operation) != 0 ? 0 : ::GetLastError();
+}
+
+DWORD PipeStream::start_write(const void* bytes, DWORD size, OVERLAPPED& operation) {
+  return ::WriteFile(pipe_.get(), bytes, size, nullptr, &operation) != 0 ? 0 : ::GetLastError();
+}
+
+DWORD PipeStream::result(OVERLAPPED& operation, DWORD& size, bool waits) {
+  return ::GetOverlappedResult(pipe_.get(), &operation, &size, waits ? TRUE : FALSE) != 0 ? 0 : ::GetLastError();
+}
+
 SocketStream::SocketStream(SOCKET socket) : socket_(socket) { begin(); }
 
 SocketStream::~SocketStream() {

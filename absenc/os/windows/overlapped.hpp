@@ -87,6 +87,22 @@ class PortStream final : public OverlappedStream {
   Handle rest_done_;
 };
 
+/// One end of a pipe between two processes.
+class PipeStream final : public OverlappedStream {
+ public:
+  explicit PipeStream(Handle pipe);
+  ~PipeStream() override;
+
+ private:
+  DWORD start_read(void* into, DWORD size, OVERLAPPED& operation) override;
+  DWORD start_write(const void* bytes, DWORD size, OVERLAPPED& operation) override;
+  DWORD result(OVERLAPPED& operation, DWORD& size, bool waits) override;
+  void cancel() override { ::CancelIoEx(pipe_.get(), nullptr); }
+  [[nodiscard]] bool ends_with_nothing() const override { return false; }
+
+  Handle pipe_;
+};
+
 /// A TCP connection.
 class SocketStream final : public OverlappedStream {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file is owned by the way it is open: other programs may read, rename and remove it, but not open it for writing.
+// A file is owned by a lock of a byte behind its end: Windows lets no other program write into locked bytes.
 #include "absenc/os/owned_file.hpp"
 
 #include <windows.h>
@@ -19,7 +19,14 @@ namespace absenc::os {
 
 namespace {
 
-constexpr DWORD share = FILE_SHARE_READ | FILE_SHARE_DELETE;
+constexpr DWORD share = FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE;
+
+// Locks the open file. Returns false if another process has locked it.
+bool lock(int file) {
+  OVERLAPPED behind{};
+  behind.OffsetHigh = 0x7FFF'FFFF;
+  return ::LockFileEx(handle_of_file(file), LOCKFILE_EXCLUSIVE_LOCK | LOCKFILE_FAIL_IMMEDIATELY, 0, 1, 0, &behind) != 0;
+}
 
 FileIdentity identity_of_handle(HANDLE file) {
   BY_HANDLE_FILE_INFORMATION about{};
@@ -44,9 +51,8 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   file_ = open_file(path, share, CREATE_NEW);
   made_ = static_cast<bool>(file_);
   if (!file_ && errno == EEXIST) file_ = open_file(path, share, OPEN_EXISTING);
-  if (file_) return;
-  if (errno == EBUSY) throw Failure(Failure::Kind::in_use, "another program keeps " + path);
-  throw system_failure("opening " + path, errno);
+  if (!file_ && errno != EBUSY) throw system_failure("opening " + path, errno);
+  if (!file_ || !lock(file_.get())) throw Failure(Failure::Kind::in_use, "another program keeps " + path);
 }
 
 void OwnedFile::replace(std::string_view content, Durable durable) {
@@ -57,10 +63,12 @@ void OwnedFile::replace(std::string_view content, Durable durable) {
     file.take_place(durable);
   } catch (const Failure&) {
     file_ = open_file(path_, share, OPEN_EXISTING);
+    static_cast<void>(lock(file_.get()));
     throw;
   }
   file_ = open_file(path_, share, OPEN_EXISTING);
   if (!file_) throw system_failure("opening " + path_, errno);
+  if (!lock(file_.get())) throw Failure(Failure::Kind::in_use, "another program keeps " + path_);
 }
 
 bool OwnedFile::has_its_name() const { return identity_of(path_) == identity_of_handle(handle_of_file(file_.get())); }

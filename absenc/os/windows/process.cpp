@@ -82,6 +82,10 @@ bool is_terminal(int descriptor) {
   return descriptor >= 0 && descriptor <= 2 && is_console(standard_stream(descriptor));
 }
 
+// Without this name, ncurses would look for TERM, which some shells set. It would show faint text on a light
+// background.
+TerminalKind terminal_kind() { return {.name = "#win32con", .has_faint_text = false}; }
+
 std::vector<std::string> command_words(int, char**) {
   int count = 0;
   wchar_t** const all = ::CommandLineToArgvW(::GetCommandLineW(), &count);

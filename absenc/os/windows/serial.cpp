@@ -63,6 +63,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
       kernel.set_modem_line(descriptor(), ModemLine::rts, false);  // the adapter must not send
     } else {
       set_direction(with_rts ? Rs485::off : rs485);
+      if (rs485 == Rs485::rts) switch_by_rts(kernel);
       take_wires(wires, kernel);
     }
   } catch (...) {
@@ -82,8 +83,7 @@ SerialPort::~SerialPort() {
 void SerialPort::change_rate(std::uint32_t rate) {
   LineSettings settings = line_;
   settings.rate = rate;
-  stream_of(descriptor()).flush(os::now() + 1s);  // written bytes must leave at the old rate
-  serial_calls().flush(serial_handle(descriptor()));
+  wait_until_sent();  // written bytes must leave at the old rate
   apply(settings);
 }
 
@@ -93,19 +93,24 @@ std::string SerialPort::rate_instead(std::uint32_t, std::uint32_t given) const {
   return "it stays at " + std::to_string(given) + ": use another rate, or another adapter";
 }
 
-// RTS is set while a port is open, as on other systems; with `on` the driver sets it only while it sends. An adapter
-// that switches by itself ignores RTS.
+// RTS is set while a port is open, as on other systems; with `on` the driver sets it only while it sends, and with
+// `rts` it is clear until this port sets it. An adapter that switches by itself ignores RTS.
 void SerialPort::set_direction(Rs485 rs485) {
   if (rs485 != Rs485::on) {
-    control_rts(descriptor(), RTS_CONTROL_ENABLE);
+    control_rts(descriptor(), rs485 == Rs485::rts ? RTS_CONTROL_DISABLE : RTS_CONTROL_ENABLE);
     return;
   }
   kernel_direction_ = control_rts(descriptor(), RTS_CONTROL_TOGGLE);
   if (!kernel_direction_) {
     throw Failure(Failure::Kind::unsupported, "the driver of the port " + path_ +
                                                   " cannot switch the direction of RS-485 by RTS: use an adapter that "
-                                                  "does it by itself, without rs485=on");
+                                                  "does it by itself, without rs485=on, or rs485=rts");
   }
+}
+
+void SerialPort::wait_until_sent() {
+  stream_of(descriptor()).flush(os::now() + 1s);
+  if (!serial_calls().flush(serial_handle(descriptor()))) fail(errno_of(::GetLastError()));
 }
 
 void SerialPort::shorten_latency() {

@@ -35,7 +35,7 @@ bool get(int descriptor, DCB& state) {
 }
 
 void write_line(DCB& state, const LineSettings& settings) {
-  const bool toggles_rts = state.fRtsControl == RTS_CONTROL_TOGGLE;
+  const DWORD rts = state.fRtsControl;
   state = {};
   state.DCBlength = sizeof state;
   state.BaudRate = settings.rate;
@@ -44,11 +44,8 @@ void write_line(DCB& state, const LineSettings& settings) {
   state.ByteSize = static_cast<BYTE>(std::min<unsigned>(settings.data_bits, 8));
   state.Parity = settings.parity == Parity::none ? NOPARITY : settings.parity == Parity::odd ? ODDPARITY : EVENPARITY;
   state.StopBits = settings.stop_bits == 2 ? TWOSTOPBITS : ONESTOPBIT;
-  if (toggles_rts) {
-    state.fRtsControl = RTS_CONTROL_TOGGLE;  // another rate leaves the direction of RS-485 as it is
-  } else {
-    state.fRtsControl = RTS_CONTROL_ENABLE;
-  }
+  // Another rate leaves the direction of RS-485 as it is.
+  state.fRtsControl = (rts == RTS_CONTROL_HANDSHAKE ? RTS_CONTROL_ENABLE : rts) & 3;
   state.fDtrControl = DTR_CONTROL_ENABLE;
 }
 
@@ -119,7 +116,7 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
 
 int WireKernel::set_modem_line(int descriptor, ModemLine line, bool set) {
   const DWORD function = line == ModemLine::rts ? (set ? SETRTS : CLRRTS) : (set ? SETDTR : CLRDTR);
-  return serial_calls().escape(serial_handle(descriptor), function) ? 0 : -1;
+  return serial_calls().escape(serial_handle(descriptor), function) || fail() ? 0 : -1;
 }
 
 bool has_gpio_lines() { return false; }

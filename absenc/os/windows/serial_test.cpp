@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -37,20 +38,26 @@ class FakeLine final : public SerialCalls {
     return true;
   }
   bool escape(HANDLE, DWORD function) override {
+    if (!has_rts) return refuse();
     escapes.push_back(function);
+    times.push_back(os::now());
     return true;
   }
   bool flush(HANDLE) override {
     ++flushes;
+    on_flush();
     return true;
   }
 
   [[nodiscard]] const DCB& state() const { return state_; }
   bool toggles = true;
+  bool has_rts = true;
   DWORD highest = 3'000'000;
   int flushes = 0;
   std::vector<DCB> states;
   std::vector<DWORD> escapes;
+  std::vector<Time> times;  // of `escapes`
+  std::function<void()> on_flush = [] {};
 
  private:
   static bool refuse() {
@@ -129,6 +136,67 @@ TEST_F(SerialPortTest, RefusesDirectionWithoutHelpOfTheDriver) {
   EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
   EXPECT_NE(std::string(failure.what()).find("by RTS"), std::string::npos) << failure.what();
   EXPECT_EQ(line.state().BaudRate, 1200u);
+}
+
+TEST_F(SerialPortTest, SetsRtsUntilTheBytesHaveLeft) {
+  SerialPort port(path, settings, Rs485::rts);
+  EXPECT_EQ(line.state().fRtsControl, RTS_CONTROL_DISABLE);
+  EXPECT_EQ(line.escapes, std::vector<DWORD>{CLRRTS});  // at rest
+  EXPECT_FALSE(port.kernel_direction());
+  const Data request{0x1A, 0x00, 0xFF};
+  Data gone;
+  line.on_flush = [&] {
+    EXPECT_EQ(line.escapes.back(), DWORD{SETRTS});
+    gone = sent(3);
+  };
+  port.begin(transfer(request));
+  EXPECT_EQ(gone, request);
+  EXPECT_EQ(line.escapes, (std::vector<DWORD>{CLRRTS, SETRTS, CLRRTS}));
+  const ByteEvent event = port.wait({});
+  EXPECT_EQ(event.kind, ByteEvent::Kind::sent);
+  EXPECT_LE(event.at, port.now());  // when the direction has changed, nothing is under way
+}
+
+constexpr LineSettings slow{.rate = 300};  // a character takes 33 ms
+
+TEST_F(SerialPortTest, HoldsRtsWhileTheAdapterMaySend) {
+  SerialPort port(path, slow, Rs485::rts);
+  const Data request{1, 2, 3};
+  port.begin(transfer(request));  // the driver is done at once
+  EXPECT_GE(line.times.back() - line.times[1], 3 * port.character_time());
+}
+
+TEST_F(SerialPortTest, ReleasesRtsAtOnceIfTheDriverHasWaited) {
+  SerialPort port(path, slow, Rs485::rts);
+  const Data request{1, 2, 3};
+  Time done{};
+  line.on_flush = [&] {
+    os::reach(os::now() + 3 * port.character_time());
+    done = os::now();
+  };
+  port.begin(transfer(request));
+  EXPECT_LT(line.times.back() - done, 3 * port.character_time());
+}
+
+TEST_F(SerialPortTest, ReleasesRtsWhenSendingFails) {
+  SerialPort port(path, settings, Rs485::rts);
+  server = Handle();
+  const Data request{1};
+  EXPECT_EQ(failure_of([&] { port.begin(transfer(request)); }).kind(), Failure::Kind::lost);
+  EXPECT_EQ(line.escapes, (std::vector<DWORD>{CLRRTS, SETRTS, CLRRTS}));
+}
+
+TEST_F(SerialPortTest, KeepsRtsClearWhenTheRateChanges) {
+  SerialPort port(path, settings, Rs485::rts);
+  port.begin({.kind = ByteStep::Kind::configure, .rate = 9600});
+  EXPECT_EQ(line.state().fRtsControl, RTS_CONTROL_DISABLE);
+}
+
+TEST_F(SerialPortTest, RefusesDirectionWithoutRts) {
+  line.has_rts = false;
+  const Failure failure = failure_of([&] { const SerialPort port(path, settings, Rs485::rts); });
+  EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
+  EXPECT_NE(std::string(failure.what()).find("no RTS line"), std::string::npos) << failure.what();
 }
 
 TEST_F(SerialPortTest, RefusesRateThatTheDriverDoesNotHave) {

@@ -23,12 +23,13 @@ Socket::Socket(int family) {
       ::WSASocketW(family, SOCK_STREAM, IPPROTO_TCP, nullptr, 0, WSA_FLAG_OVERLAPPED | WSA_FLAG_NO_HANDLE_INHERIT);
 }
 
-Addresses look_up(const std::string& host, std::uint16_t port) {
+Addresses look_up(const std::string& host, std::uint16_t port, int type, int flags) {
   start_winsock();
   const bool in_brackets = host.size() > 2 && host.front() == '[' && host.back() == ']';
   const std::string plain = in_brackets ? host.substr(1, host.size() - 2) : host;
   addrinfo wanted{};
-  wanted.ai_socktype = SOCK_STREAM;
+  wanted.ai_socktype = type;
+  wanted.ai_flags = flags;
   addrinfo* found = nullptr;
   const int error = ::getaddrinfo(plain.c_str(), std::to_string(port).c_str(), &wanted, &found);
   if (error != 0) {

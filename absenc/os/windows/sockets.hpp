@@ -10,6 +10,8 @@
 #include <string>
 #include <utility>
 
+#include "absenc/os/windows/waitable.hpp"
+
 namespace absenc::os {
 
 /// A socket that closes itself.
@@ -36,10 +38,19 @@ class Socket {
   SOCKET socket_ = INVALID_SOCKET;
 };
 
+/// A socket that a descriptor holds. No wait watches it.
+struct HeldSocket final : Waitable {
+  explicit HeldSocket(Socket held) : socket(std::move(held)) {}
+  HANDLE readable() override { return nullptr; }
+
+  Socket socket;
+};
+
 using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
 
-/// Returns the addresses of `host`, an IPv6 address also in brackets. Throws Failure `not_found`.
-[[nodiscard]] Addresses look_up(const std::string& host, std::uint16_t port);
+/// Returns the addresses of `host`, an IPv6 address also in brackets, for sockets of this type. `flags`: AI_PASSIVE for
+/// listening. Throws Failure `not_found`.
+[[nodiscard]] Addresses look_up(const std::string& host, std::uint16_t port, int type = SOCK_STREAM, int flags = 0);
 
 /// Sends small pieces at once: a request must not wait for the acknowledgement of the previous one.
 void send_at_once(SOCKET socket);

@@ -9,9 +9,9 @@ namespace absenc::author {
 // ---- Calls of the subclass
 
 void BitEngine::send(const BitRequest& request, const Manner& manner, Time earliest) {
+  earliest_ = std::max(earliest, received_at_ + request_.hold);
   request_ = request;
   manner_ = manner;
-  earliest_ = earliest;
   state_ = State::ready;
   if (request.clocks > 8 * storage_.size()) finish(Error::invalid_argument);
 }
@@ -23,6 +23,7 @@ void BitEngine::sleep(Time time) {
 
 void BitEngine::finish(Error error, Time hold) {
   error_ = error;
+  hold = std::max(hold, request_.hold);
   earliest_ = received_at_ + hold;
   state_ = hold == Time{} ? State::over : State::ending;
 }
@@ -112,6 +113,7 @@ void BitEngine::feed(const ByteEvent& event) {
 
 void BitEngine::received(const ByteEvent& event) {
   received_at_ = event.at;
+  sampled_after_ = event.width;
   if (state_ == State::added) return conclude_with(reply_error_);
   append({event.items, std::min({event.bits, 8 * event.items.size(), awaited_})});
   const bool whole = event.bits >= awaited_;

@@ -26,6 +26,9 @@ struct BitRequest {
   std::size_t late_clocks = 0;
   std::uint32_t rate = 0;  ///< Rate of the clock in Hz.
   Time rest{};             ///< Shortest time from the last exchange to this one.
+  /// Shortest time from this exchange to the next one; also to that of another conversation, whose `rest` may be
+  /// shorter.
+  Time hold{};
 
   /// Returns whether there are no bits to send: the request has no encoding.
   [[nodiscard]] constexpr bool empty() const { return bits.size() == 0; }
@@ -69,6 +72,9 @@ class BitEngine : public Conversation<std::uint8_t> {
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Returns the end of the last exchange.
   [[nodiscard]] Time received_at() const { return received_at_; }
+  /// Returns the time from the edge at which the encoder changes a bit until the port samples it, in the last transfer;
+  /// 0: half a period of the clock.
+  [[nodiscard]] Time sampled_after() const { return sampled_after_; }
   /// Returns the bits received last, valid or not.
   [[nodiscard]] BitView reply() const { return {Bytes(storage_).first((size_ + 7) / 8), size_}; }
   /// Returns false: an encoder on a clocked line cannot send without a clock.
@@ -125,6 +131,7 @@ class BitEngine : public Conversation<std::uint8_t> {
   Time begun_at_{};
   Time sent_at_{};
   Time received_at_{};
+  Time sampled_after_{};
 };
 
 }  // namespace absenc::author

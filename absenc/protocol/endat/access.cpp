@@ -50,7 +50,6 @@ Part<std::uint16_t> write_word_21(Dialog& dialog, std::uint8_t& selected, WordPl
   // is read back shows whether it was written.
   static_cast<void>(co_await dialog.attempt(request).changes());
   dialog.changes();
-  co_await dialog.rest(memory_access_time);
   co_return co_await read_word_21(dialog, selected, word, step);
 }
 
@@ -95,7 +94,6 @@ Part<bool> restore(Dialog& dialog, SelectedInfos before) {
   if (dialog.format().info2 != before.info2) {
     co_await select_22(dialog, before.info2 != 0 ? before.info2 : std::uint8_t{mrs::stop_info_2}, step);
   }
-  co_await dialog.rest(long_recovery);
   co_return true;
 }
 
@@ -127,7 +125,6 @@ namespace {
 
 // Selects a memory area and verifies by the acknowledgement that the encoder has it.
 Part<bool> select_area_22(Dialog& dialog, std::uint8_t area, std::string_view step) {
-  co_await select_22(dialog, mrs::nothing, step);
   co_await select_22(dialog, area, step);
   const std::uint16_t acknowledged = co_await read_info_1(dialog, mrs::acknowledge_mrs, step);
   if (acknowledged >> 8 != area) co_await dialog.stop(no_area);
@@ -161,9 +158,8 @@ Part<SelectedInfos> begin_access(Dialog& dialog) {
 }
 
 Part<bool> end_access(Dialog& dialog, SelectedInfos before) {
-  if (dialog.format().version == CommandSet::v22) co_return co_await restore(dialog, before);
-  co_await dialog.rest(long_recovery);
-  co_return true;
+  if (dialog.format().version == CommandSet::v21) co_return true;
+  co_return co_await restore(dialog, before);
 }
 
 // ---- Resolution
@@ -197,7 +193,6 @@ Part<bool> know_resolution(Dialog& dialog) {
                           "set the options singleturn_bits and multiturn_bits"});
   }
   dialog.set_format(format);
-  co_await dialog.rest(long_recovery);
   co_return true;
 }
 

@@ -38,7 +38,7 @@ struct SelectedInfos {
 author::Part<SelectedInfos> find_selection(Dialog& dialog);
 /// Selects a memory area or, with an MRS code from 40 to 5F, an additional information (EnDat 2.2).
 author::Part<bool> select_22(Dialog& dialog, std::uint8_t mrs, std::string_view step);
-/// Selects what was selected when the procedure began, and waits for the recovery time.
+/// Selects what was selected when the procedure began.
 author::Part<bool> restore(Dialog& dialog, SelectedInfos before);
 /// Selects and reads additional information 1 with the MRS code `wanted`. Errors: busy, unexpected_reply (the encoder
 /// sends none), request_rejected (it sends another one), or that of an exchange.
@@ -52,7 +52,7 @@ author::Part<SelectedInfos> begin_access(Dialog& dialog);
 /// Reads a word by the commands of the format's version, between `begin_access` and `end_access`. `selected` as for
 /// `select`. Errors: unsupported, request_rejected, busy, unexpected_reply, or that of an exchange.
 author::Part<std::uint16_t> read_word(Dialog& dialog, std::uint8_t& selected, WordPlace word, std::string_view step);
-/// Restores the selection from before the accesses, and waits for the recovery time.
+/// Restores the selection from before the accesses.
 author::Part<bool> end_access(Dialog& dialog, SelectedInfos before);
 
 /// Asks the encoder for its resolution, if the options do not state it. Errors: unsupported, cross_check_failed, or

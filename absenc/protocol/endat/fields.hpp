@@ -74,8 +74,9 @@ struct Values {
   std::optional<bool> speaks_22{};             ///< Whether the encoder has the commands of EnDat 2.2.
   std::optional<std::uint8_t> recovery{};      ///< Recovery time: 0 long, 1 short.
   std::optional<std::uint32_t> line_delay{};   ///< Delay of the line, there and back, in ns.
-  std::optional<std::int32_t> datum_shift{};   ///< Datum shift, in signal periods.
-  std::optional<bool> written{};               ///< False if the encoder had the value already.
+  std::optional<bool> delay_shorter{};        ///< Whether the delay is shorter than `line_delay`: too short to measure.
+  std::optional<std::int32_t> datum_shift{};  ///< Datum shift, in signal periods.
+  std::optional<bool> written{};              ///< False if the encoder had the value already.
 };
 
 /// Table of the fields of requests, replies and results.
@@ -119,6 +120,8 @@ inline constexpr auto fields = [] {
       field<&Values::speaks_22>("endat_22", "", "whether the encoder has the commands of EnDat 2.2"),
       field<&Values::recovery>("recovery", "", "recovery time: 0 is 10 to 30 us, 1 is 1.25 to 3.75 us"),
       field<&Values::line_delay>("line_delay_ns", "ns", "delay of line and transceivers, there and back"),
+      field<&Values::delay_shorter>("delay_shorter", "",
+                                    "whether the delay is shorter than that, too short to measure"),
       field<&Values::datum_shift>("datum_shift", "", "datum shift, in signal periods"),
       field<&Values::written>("written", "", "false when the value was there already", Role::written));
 }();

@@ -88,7 +88,6 @@ inline constexpr Time memory_access_time = 12ms;         ///< Longest time of an
 inline constexpr Time long_recovery = 30us;              ///< Longest recovery time (tm) after commands of EnDat 2.1.
 inline constexpr Time short_recovery = 3750ns;           ///< Longest short recovery time after commands of EnDat 2.2.
 inline constexpr Time reset_time = 50ms;                 ///< How long a host waits after a reset.
-inline constexpr Time start_time = 1400ms;               ///< How long a host waits after power on.
 inline constexpr std::uint32_t fastest_21 = 2'000'000;   ///< Highest clock rate without delay compensation, in Hz.
 inline constexpr std::uint32_t fastest_22 = 16'000'000;  ///< Highest clock rate with delay compensation, in Hz.
 inline constexpr std::uint32_t slowest = 100'000;        ///< Lowest clock rate, in Hz.

@@ -83,6 +83,57 @@ TEST(EndatFrame, FindsHostsBitsInABurst) {
   EXPECT_EQ(end - start, 1 + reply_size(format, request.code));
 }
 
+TEST(EndatFrame, RefusesRequestsThatAreNone) {
+  const auto error_of = [](std::vector<std::uint8_t> bytes, std::size_t bits) {
+    return decode_request({bytes, bits}).error();
+  };
+  EXPECT_EQ(error_of({0x00}, 4), Error::wrong_length);
+  EXPECT_EQ(error_of({0x3F}, 8), Error::unexpected_reply) << "no mode command";
+  EXPECT_EQ(error_of({0xC7}, 8), Error::out_of_range) << "ones in the two clocks before the mode command";
+  EXPECT_EQ(error_of({0x07}, 8), Error::none);
+  EXPECT_EQ(error_of({0x07, 0x00}, 16), Error::wrong_length);
+}
+
+TEST(EndatFrame, ReplyToAWriteRepeatsTheWord) {
+  const Request write{.code = ModeCommand::write, .byte = 8, .word = 0x1234};
+  for (const std::uint16_t word : std::to_array<std::uint16_t>({0x1234, 0x1235})) {
+    BitBuffer<192> line;
+    line.append(0, turn_bits);
+    encode_reply({}, write.code, {.byte = 8, .word = word}, line);
+    EXPECT_EQ(decode_reply({}, write, line.view()).error(), word == 0x1234 ? Error::none : Error::request_rejected);
+  }
+}
+
+TEST(EndatFrame, AdditionalInformationBeginsWithZero) {
+  const Format format{.singleturn_bits = 25, .info1 = 0x45};
+  const Request request{.code = ModeCommand::position_22};
+  Reply reply{.position = 5, .info_count = 1};
+  reply.infos[0].number = 5;
+  BitBuffer<192> line;
+  line.append(0, turn_bits);
+  encode_reply(format, request.code, reply, line);
+  ASSERT_TRUE(decode_reply(format, request, line.view()));
+  std::vector<std::uint8_t> bytes(line.bytes().begin(), line.bytes().end());
+  const std::size_t first = turn_bits + 1 + position_size(format, request.code);
+  bytes[first / 8] = static_cast<std::uint8_t>(bytes[first / 8] | 0x80 >> first % 8);
+  EXPECT_EQ(decode_reply(format, request, {bytes, line.size()}).error(), Error::bad_checksum);
+}
+
+TEST(EndatFrame, SearchForInformationNeedsAHighLineBehindTheReply) {
+  const Format format{.singleturn_bits = 25};
+  const Request seeking{.code = ModeCommand::position_22, .seeks_infos = true};
+  const auto behind = [&](std::uint64_t bits) {
+    BitBuffer<192> line;
+    line.append(0, turn_bits);
+    encode_reply(format, seeking.code, {.position = 5}, line);
+    line.append(bits, 60);
+    return decode_reply(format, seeking, line.view()).error();
+  };
+  EXPECT_EQ(behind(low_mask(60)), Error::none);
+  EXPECT_EQ(behind(low_mask(60) & ~std::uint64_t{1}), Error::bad_checksum) << "the last bit is low";
+  EXPECT_EQ(behind(0), Error::bad_checksum) << "the encoder drives zeros";
+}
+
 // ---- Alarms in captures
 
 constexpr Format rotary{.singleturn_bits = 25};

@@ -57,9 +57,29 @@ TEST(EndatHost, KeepsRecoveryTimeOfEachVersion) {
     const Time before = bench.line.now();
     Ask host(format, {.code = ModeCommand::position_22});
     bench.run(host);
-    EXPECT_EQ(host.begun_at() - before, recovery == Recovery::long_time ? long_recovery : short_recovery);
+    EXPECT_EQ(host.begun_at() - before, recovery == Recovery::long_time ? Time(30us) : Time(3750ns));
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
   }
+}
+
+TEST(EndatHost, WaitsForTheLongestTimesOfTheSources) {
+  Format format = rotary;
+  format.clock_khz = 8000;
+  Bench slow(format, {.latency = 10us, .read_time = 11'990us});
+  EXPECT_TRUE(ask(slow, format, {.code = ModeCommand::position_22})) << "the default of latency_us";
+  EXPECT_TRUE(ask(slow, format, {.code = ModeCommand::select, .byte = area::maker_1})) << "an access takes up to 12 ms";
+}
+
+TEST(EndatEncoder, TakesThePeriodOfItsFormatIfThePortDoesNotKnowIt) {
+  testing::SetShaft shaft;
+  VirtualEncoder encoder(rotary, shaft, {.latency = 20us});
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  constexpr std::array<std::uint8_t, 1> command{0x38};
+  encoder.feed({.kind = ByteEvent::Kind::selected, .at = 1ms});
+  encoder.feed({.kind = ByteEvent::Kind::received, .at = 1ms + 8us, .items = command, .bits = 8});
+  const ByteStep step = encoder.next(1ms + 8us);
+  EXPECT_EQ(find_start({step.out, 8 * step.out.size()}), 20u - command_bits) << "1 MHz";
+  EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
 TEST(EndatEncoder, IgnoresExchangeWithinRecoveryTime) {
@@ -131,6 +151,60 @@ TEST(EndatEncoder, SaysWhenTheClockIsTooFastOrTooSlow) {
   EXPECT_EQ(broken_at(2'100'000, CommandSet::v21), rules::fastest);
   EXPECT_EQ(broken_at(8'000'000, CommandSet::v22), "");
   EXPECT_EQ(broken_at(90'000, CommandSet::v22), rules::slowest);
+}
+
+TEST(EndatEncoder, SaysWhenParametersAreClockedTooFast) {
+  Bench bench(rotary);
+  constexpr std::array<std::uint8_t, 4> select{0x0E, area::maker_1, 0, 0};
+  Script host({{.kind = ByteStep::Kind::transfer, .out = select, .bits = 1200, .out_bits = 32, .rate = 4'000'000}});
+  bench.run(host);
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, rules::parameter_clock);
+}
+
+TEST(EndatEncoder, IgnoresAnAccessWhileItIsBusy) {
+  Bench bench(rotary);
+  Format informed = rotary;
+  ASSERT_TRUE(ask(bench, informed, {.code = ModeCommand::select_22, .byte = area::maker_1}));
+  ASSERT_TRUE(ask(bench, informed, {.code = ModeCommand::select_22, .byte = mrs::memory_low}));
+  informed.info1 = mrs::memory_low;
+  ASSERT_TRUE(ask(bench, informed, {.code = ModeCommand::read_22, .byte = 0x0D}));
+  ASSERT_TRUE(ask(bench, informed, {.code = ModeCommand::read_22, .byte = 0x0E}));
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, rules::busy);
+  bench.line.run_until(bench.line.now() + 1ms);
+  const Result<Reply> reply = ask(bench, informed, {.code = ModeCommand::position_22});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->info(1)->content, 0x0D19) << "the word of the first access";
+  EXPECT_FALSE(reply->info(1)->busy);
+}
+
+// The start bit comes at the first clock that begins when the encoder is ready, to the nanosecond.
+TEST(EndatEncoder, SendsTheStartBitWhenItIsReady) {
+  const auto start_after = [](const EncoderTimes& times, const Request& request) {
+    Bench bench(rotary, times);
+    if (request.code == ModeCommand::read) {
+      static_cast<void>(ask(bench, rotary, {.code = ModeCommand::select, .byte = area::maker_1}));
+    }
+    const Result<Reply> reply = ask(bench, rotary, request);
+    return reply ? reply->start : 0;
+  };
+  const Request position{.code = ModeCommand::position_22};
+  EXPECT_EQ(start_after({.latency = 10us}, position), 10u);
+  EXPECT_EQ(start_after({.latency = 9'001ns}, position), 10u);
+  EXPECT_EQ(start_after({.latency = 2us}, position), 10u) << "not before the line has turned";
+  Format slow = rotary;
+  slow.latency = 20us;
+  for (const auto& [latency, start] : {std::pair{Time(12'000ns), 12}, std::pair{Time(12'001ns), 13}}) {
+    Bench bench(slow, {.latency = latency});
+    const Result<Reply> reply = ask(bench, slow, position);
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->start, start);
+  }
+  const Request read{.code = ModeCommand::read, .byte = 0x0D};
+  constexpr std::size_t turned = access_bits + turn_bits;  // clocks of 10 us
+  EXPECT_EQ(start_after({.read_time = 200us}, read), turned + 20);
+  EXPECT_EQ(start_after({.read_time = 200'001ns}, read), turned + 21);
 }
 
 }  // namespace

@@ -50,11 +50,7 @@ Part<bool> store(Dialog& dialog, std::uint8_t& selected, WordPlace place, std::u
   const Result<Reply> written = co_await dialog.attempt(request).changes();
   // A refusal may be a damaged reply, too, which the checksum misses in one of 32.
   dialog.changes();
-  if (by_22) {
-    co_await wait_until_ready(dialog, "the word was written, but could not be read back");
-  } else {
-    co_await dialog.rest(memory_access_time);
-  }
+  if (by_22) co_await wait_until_ready(dialog, "the word was written, but could not be read back");
   const std::uint16_t now =
       co_await read_word(dialog, selected, place, "the word was written, but could not be read back");
   if (now == value) co_return true;

@@ -16,7 +16,6 @@ Part<std::uint32_t> read_alarms(Dialog& dialog, ProcedureResult& found) {
   std::uint8_t selected = 0;
   const std::uint16_t errors = co_await read_word_21(dialog, selected, error_word, "");
   const std::uint16_t warnings = co_await read_word_21(dialog, selected, warning_word, "");
-  co_await dialog.rest(long_recovery);
   add_alarms(found.reading, {errors, warnings});
   found.alarms = static_cast<std::uint16_t>(found.reading.alarms);
   found.command.reset();  // the values are of several exchanges
@@ -55,7 +54,6 @@ Procedure clear_alarms(Dialog& dialog, ProcedureResult& found) {
     // If the reply is lost, the alarms that are read afterwards show whether they were cleared.
     static_cast<void>(co_await dialog.attempt({.code = ModeCommand::write, .byte = word.address, .word = 0}).changes());
   }
-  co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
   const std::uint32_t alarms = co_await read_alarms(dialog, found);
   if (alarms != 0) {
@@ -119,7 +117,6 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
   co_await append_words(dialog, selected, found, id_words, 3);
   co_await append_words(dialog, selected, found, serial_words, 3);
   const std::uint16_t set = co_await read_word_21(dialog, selected, command_set_word, "");
-  co_await dialog.rest(long_recovery);
   found.bits = static_cast<std::uint8_t>(count & 0x3F);
   found.type = type;
   found.kind = kind_of(type);
@@ -139,15 +136,26 @@ Procedure read_info(Dialog& dialog, ProcedureResult& found) {
 
 // ---- Resets, zero, recovery time
 
+namespace {
+
+// Notes that the encoder has ended the selection of additional information, and returns the one from before.
+SelectedInfos end_selection(Dialog& dialog) {
+  Format format = dialog.format();
+  const SelectedInfos before{format.info1, format.info2};
+  format.info1 = format.info2 = 0;
+  dialog.set_format(format);
+  return before;
+}
+
+}  // namespace
+
 Procedure reset(Dialog& dialog, ProcedureResult& found) {
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset}).changes());
   co_await dialog.rest(reset_time);
-  // A reset ends the selection of additional information.
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos before = end_selection(dialog);
   co_await know_resolution(dialog);
   co_await look(dialog, found);
+  co_await restore(dialog, before);
   co_return done;
 }
 
@@ -155,12 +163,12 @@ Procedure reset_errors(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   co_await find_selection(dialog);
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::error_reset_22}).changes());
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos before = end_selection(dialog);
   co_await dialog.rest(memory_access_time);
   co_await look(dialog, found);
-  if (has_error(ModeCommand::position_22, dialog.last())) {
+  const bool remains = has_error(ModeCommand::position_22, dialog.last());
+  co_await restore(dialog, before);
+  if (remains) {
     co_return {Error::cross_check_failed, "an error remains",
                "`absenc run ... status` names it, then `absenc clear-alarms`"};
   }
@@ -229,10 +237,9 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
   static_cast<void>(co_await dialog.ask({.code = ModeCommand::reset})
                         .or_say("the datum shift is stored and holds after the next start"));
   co_await dialog.rest(reset_time);
-  Format format = dialog.format();
-  format.info1 = format.info2 = 0;
-  dialog.set_format(format);
+  const SelectedInfos selection = end_selection(dialog);
   const Reading now = co_await look(dialog, found);
+  co_await restore(dialog, selection);
   found.datum_shift = static_cast<std::int32_t>(wanted);
   found.command.reset();
   const bool is_zero = is_near(now.singleturn, 0, now.singleturn_bits, zero_millidegrees) ||
@@ -247,7 +254,6 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
 Procedure read_recovery(Dialog& dialog, ProcedureResult& found) {
   std::uint8_t selected = 0;
   const std::uint16_t word = co_await read_word_21(dialog, selected, initialisation_word, "");
-  co_await dialog.rest(long_recovery);
   found.recovery = (word & recovery_mask) == short_recovery_bits ? 1 : 0;
   co_return done;
 }
@@ -264,13 +270,9 @@ Procedure set_recovery(Dialog& dialog, ProcedureResult& found, Arguments argumen
   const auto wanted = static_cast<std::uint16_t>((before & ~recovery_mask) | bits);
   found.recovery = static_cast<std::uint8_t>(arguments[0]);
   found.written = wanted != before;
-  if (wanted == before) {
-    co_await dialog.rest(long_recovery);
-    co_return done;
-  }
+  if (wanted == before) co_return done;
   const std::uint16_t now = co_await write_word_21(dialog, selected, initialisation_word, wanted,
                                                    "the recovery time was written, but could not be read back");
-  co_await dialog.rest(long_recovery);
   if (now == wanted) co_return done;
   if (now == before) dialog.refused();
   co_return {Error::cross_check_failed, "the encoder has another recovery time than was written",
@@ -301,7 +303,6 @@ Procedure read_infos(Dialog& dialog, ProcedureResult& found, Arguments arguments
 Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const SelectedInfos before = co_await find_selection(dialog);
-  co_await select_22(dialog, mrs::nothing, "");
   const std::uint16_t tenths = co_await read_info_1(dialog, mrs::internal_temperature, "");
   co_await restore(dialog, before);
   found.temperature = (static_cast<double>(tenths) * 10 - 27'315) / 100;
@@ -326,10 +327,16 @@ Part<std::size_t> clocks_at(Dialog& dialog, std::uint16_t khz) {
   co_return first;
 }
 
+// Returns the shortest delay of the line that moves the start bit by a clock, at the clock rate of the last exchange.
+Time shortest_delay(const Dialog& dialog) {
+  return dialog.sampled_after() != Time{} ? dialog.sampled_after() : dialog.format().period() / 2;
+}
+
 }  // namespace
 
 // At a clock so slow that the position is ready behind the mode command, the start bit comes with clock 11. The delay
-// moves it by a clock as soon as it is longer than half a period: the slowest clock at which it does is searched.
+// moves it by a clock as soon as it is longer than the time from the edge to the sample, which is half a period on most
+// ports: the slowest clock at which it does is searched.
 Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const Format given = dialog.format();
@@ -344,14 +351,18 @@ Procedure measure_delay(Dialog& dialog, ProcedureResult& found) {
                "the start bit is late even at 100 kHz: the position takes too long to be calculated",
                "compute the delay from the cable (10 ns for each metre) and the transceivers, and set line_delay_ns"};
   }
-  if (high > low && co_await clocks_at(dialog, high) == earliest) low = high;
+  const bool moves = high > low && co_await clocks_at(dialog, high) != earliest;
+  if (!moves) low = high;
+  Time delay = shortest_delay(dialog);
   while (high - low > low / 50 + 1) {
     const auto middle = static_cast<std::uint16_t>((low + high) / 2);
     const std::size_t clocks = co_await clocks_at(dialog, middle);
     (clocks == earliest ? low : high) = middle;
+    if (clocks != earliest) delay = shortest_delay(dialog);
   }
   dialog.set_format(given);
-  found.line_delay = 500'000u / high;
+  found.line_delay = static_cast<std::uint32_t>(delay.count());
+  found.delay_shorter = !moves;
   co_return done;
 }
 

@@ -33,12 +33,14 @@ author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments 
 /// Writes a word if it differs, and verifies it. Arguments: MRS code of the area, address, value.
 author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Makes the present position the zero by the datum shift, and verifies it. Errors: unsupported, invalid_argument,
-/// not_still, cross_check_failed, or that of an exchange.
+/// Makes the present position the zero by the datum shift, verifies it, and selects the additional information of the
+/// format again. Errors: unsupported, invalid_argument, not_still, cross_check_failed, or that of an exchange.
 author::Procedure set_zero(Dialog& dialog, ProcedureResult& found);
-/// Resets the encoder, waits until it has started, and reads the position.
+/// Resets the encoder, waits until it has started, reads the position, and selects the additional information of the
+/// format again.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found);
-/// Resets errors that the encoder can reset within a control cycle (EnDat 2.2), and reads the position.
+/// Resets errors that the encoder can reset within a control cycle (EnDat 2.2), reads the position, and selects the
+/// additional information from before again. Error: cross_check_failed if an error remains.
 author::Procedure reset_errors(Dialog& dialog, ProcedureResult& found);
 /// Reads the recovery time that is selected for EnDat 2.2.
 author::Procedure read_recovery(Dialog& dialog, ProcedureResult& found);

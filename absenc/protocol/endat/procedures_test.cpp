@@ -216,11 +216,42 @@ TEST(EndatProcedures, MeasuresTheDelayOfTheLine) {
     const auto measured = bench.run("line-delay");
     ASSERT_EQ(measured.error, Error::none) << measured.detail;
     EXPECT_NEAR(static_cast<double>(measured.numbers.at("line_delay_ns")), delay, delay * 0.04);
+    EXPECT_EQ(measured.numbers.at("delay_shorter"), 0);
   }
   // A delay below half a period of the fastest clock at which the position is ready in time moves no start bit.
   Bench near("singleturn_bits=25 clock_khz=8000 line_delay_ns=20");
   near.options = author::testing::options_of(endat::unit, "singleturn_bits=25 clock_khz=8000 latency_us=5");
-  EXPECT_LE(near.run("line-delay").numbers.at("line_delay_ns"), 250);
+  const auto short_one = near.run("line-delay");
+  EXPECT_EQ(short_one.numbers.at("line_delay_ns"), 250);
+  EXPECT_EQ(short_one.numbers.at("delay_shorter"), 1);
+}
+
+TEST(EndatProcedures, DelayIsLongerOnPortsThatSampleLate) {
+  // A port that samples a whole period behind the edge: of the same delay, it needs twice as much to miss a clock.
+  struct LatePort final : Machine<std::uint8_t> {
+    explicit LatePort(Machine<std::uint8_t>& of) : host(of) {}
+    void feed(const ByteEvent& event) override {
+      ByteEvent late = event;
+      if (event.kind == ByteEvent::Kind::received) late.width = Time(1'000'000'000 / rate);
+      host.feed(late);
+    }
+    ByteStep next(Time now) override {
+      const ByteStep step = host.next(now);
+      if (step.kind == ByteStep::Kind::transfer) rate = step.rate;
+      return step;
+    }
+    Machine<std::uint8_t>& host;
+    std::uint32_t rate = 1;
+  };
+  Bench bench("singleturn_bits=25 clock_khz=8000 line_delay_ns=700");
+  bench.options = author::testing::options_of(endat::unit, "singleturn_bits=25 clock_khz=8000 latency_us=5");
+  const author::testing::Talk<std::uint8_t> talk(bench.unit, bench.options, "line-delay");
+  LatePort host(*talk);
+  bench.line.converse(host);
+  author::testing::RunResult measured;
+  measured.take(*talk);
+  ASSERT_EQ(measured.error, Error::none) << measured.detail;
+  EXPECT_NEAR(static_cast<double>(measured.numbers.at("line_delay_ns")), 1400, 56);
 }
 
 TEST(EndatProcedures, InfoDescribesTheEncoder) {

@@ -58,7 +58,8 @@ struct Protocol {
         .bits = encode_request(request),
         .supplement = encode_supplement(request),
         .rate = rate,
-        .rest = is_22(code) && format.recovery == Recovery::short_time ? short_recovery : long_recovery};
+        .rest = is_22(code) && format.recovery == Recovery::short_time ? short_recovery : long_recovery,
+        .hold = !is_22(code) && format.version == CommandSet::v22 ? long_recovery : Time{}};
     const std::size_t reply = 1 + reply_size(format, code);
     const std::size_t longest_start = clocks_to_start(format.latency, rate) + delay_clocks(format.line_delay_ns, rate);
     if (has_parameters(code)) {

@@ -43,8 +43,12 @@ Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
     return {"the start bit came so late that bits of the reply are missing",
             "measure the delay with `absenc run ... line-delay` and set line_delay_ns, or raise latency_us"};
   }
+  if (error == Error::bad_checksum && asked && has_parameters(asked->code)) {
+    return {"the line damages the reply, or two encoders drive it", "check shielding, termination and common ground"};
+  }
   if (error == Error::bad_checksum) {
-    return {{}, "check singleturn_bits and multiturn_bits, lower clock_khz, check shielding and termination"};
+    return {"the encoder has another number of bits than the options state, or the line damages its replies",
+            "check singleturn_bits and multiturn_bits, lower clock_khz, check shielding and termination"};
   }
   if (error == Error::request_rejected && asked) {
     return {"the encoder repeats another MRS code or address than it was asked for",
@@ -109,7 +113,6 @@ constexpr Command read_info_of{"position", Verb::read, 0, "position, turns and e
 template <ModeCommand code>
 Procedure send(Dialog& dialog, ProcedureResult& result, Arguments arguments) {
   const Reply reply = co_await dialog.ask(ask_with<code>(dialog.format(), arguments)).changes();
-  co_await dialog.rest(long_recovery);
   static_cast<Values&>(result) = values_of(dialog.format(), dialog.request(), reply);
   co_return done;
 }

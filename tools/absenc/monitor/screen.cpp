@@ -16,6 +16,7 @@ namespace absenc::tool {
 struct Screen::Terminal {
   SCREEN* screen = nullptr;
   bool colours = false;
+  attr_t attributes = ~attr_t{0};  // the attributes that the terminal can show
 };
 
 namespace {
@@ -34,9 +35,9 @@ constexpr std::array<TextAttributes, 7> looks{{{A_NORMAL, 0},
                                                {A_BOLD, COLOR_YELLOW},
                                                {A_BOLD, COLOR_RED}}};
 
-attr_t attributes_of(Style style, bool colours) {
+attr_t attributes_of(Style style, attr_t allowed, bool colours) {
   const TextAttributes& look = looks[static_cast<std::size_t>(style)];
-  return look.attributes | (colours && look.colour != 0 ? static_cast<attr_t>(COLOR_PAIR(look.colour)) : 0);
+  return (look.attributes & allowed) | (colours && look.colour != 0 ? static_cast<attr_t>(COLOR_PAIR(look.colour)) : 0);
 }
 
 std::string shown(std::string_view text, std::size_t width) {
@@ -94,7 +95,9 @@ std::unique_ptr<Screen> Screen::open() {
   if (!os::is_terminal(0) || !os::is_terminal(1)) return nullptr;
   auto terminal = std::make_unique<Terminal>();
   ::set_escdelay(25);
-  terminal->screen = ::newterm(nullptr, stdout, stdin);
+  const os::TerminalKind kind = os::terminal_kind();
+  if (!kind.has_faint_text) terminal->attributes &= ~attr_t{A_DIM};
+  terminal->screen = ::newterm(kind.name, stdout, stdin);
   if (terminal->screen == nullptr) return nullptr;
   if (::tigetstr("cup") == nullptr) {  // the terminal, for example with TERM=dumb, cannot move the cursor
     ::endwin();
@@ -129,7 +132,7 @@ void Screen::clear() { ::erase(); }
 
 void Screen::put(int row, int column, std::string_view text, Style style) {
   if (row < 0 || row >= rows() || column < 0 || column >= columns()) return;
-  ::attrset(static_cast<int>(attributes_of(style, terminal_->colours)));
+  ::attrset(static_cast<int>(attributes_of(style, terminal_->attributes, terminal_->colours)));
   ::mvaddstr(row, column, shown(text, static_cast<std::size_t>(columns() - column)).c_str());
   ::attrset(A_NORMAL);
 }

@@ -12,6 +12,7 @@
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/file_name.hpp"
+#include "absenc/os/serial_ports.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/capture_choices.hpp"
@@ -171,7 +172,8 @@ int run_identify(const Invocation& invocation) {
   os::catch_interrupts();
   const bool frames = invocation.has("--hex") || invocation.has("--request");
   if (frames == invocation.has("where")) {
-    throw UsageError("give one of: a port, as /dev/ttyUSB0; a capture file; captured frames with --hex");
+    throw UsageError(
+        fmt::format("give one of: a port, as {}; a capture file; captured frames with --hex", os::example_port()));
   }
   if (frames && !invocation.has("--hex")) throw UsageError("requests alone do not tell: give the replies with --hex");
   if (frames) return identify_frames(invocation);

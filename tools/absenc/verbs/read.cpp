@@ -195,7 +195,7 @@ const Subcommand read_subcommand{
     "Endless reading (--count 0) shows the speed of a shaft that turns: its mean since an earlier reading, with the\n"
     "most that it can be off the true mean (12.0 ± 0.3 rpm); none while the times of the readings leave much open.\n"
     "Linear encoders, those with a unit_um, have millimetres and micrometres in place of degrees.\n"
-    "Settings of the port: baud=RATE, rs485=auto|on|off, latency=MS, echo=auto|on|off; of sim also\n"
+    "Settings of the port: baud=RATE, rs485=auto|on|off|rts, latency=MS, echo=auto|on|off; of sim also\n"
     "motion=, singleturn=, multiturn=, alarm=, fault=. `absenc list <protocol>` shows the protocol's options.\n"
     "Exit status 1 when a reading failed; endless reading is judged by its last one.",
     read_parameters,

@@ -13,6 +13,7 @@
 #include "absenc/host/echo.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial.hpp"
+#include "absenc/os/serial_ports.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/socketcan.hpp"
 #include "tools/absenc/error.hpp"
@@ -58,7 +59,7 @@ void serve_as(Machine<Item>& machine, const std::string& name, Time end, const O
 EncoderAddress parse_served_port(const Unit& unit, std::string_view text) {
   const EncoderAddress uri = parse_address(fmt::format("{}:{}", unit.id, text));
   if (uri.port_kind != PortKind::serial) {
-    throw UsageError(fmt::format("--port is \"{}\", but must be a serial port, as in /dev/ttyUSB1", text));
+    throw UsageError(fmt::format("--port is \"{}\", but must be a serial port, as in {}", text, os::example_port(1)));
   }
   std::string_view rest = text.substr(std::min(text.find('?'), text.size()));
   while (!rest.empty()) {

@@ -3,18 +3,21 @@
 #include "absenc/capture/files/zip_writer.hpp"
 
 #include <stdexcept>
+#include <utility>
+
+#include "absenc/capture/files/source.hpp"
 
 namespace absenc::capture {
 
 void ZipWriter::Close::operator()(void*) const {}
 
 void ZipWriter::fail() const {
-  throw std::runtime_error(path_ +
+  throw std::runtime_error(name_of(path_) +
                            " would be a zip archive, which this program cannot write: it was built without "
                            "minizip");
 }
 
-ZipWriter::ZipWriter(const std::string& path) : path_(path) { fail(); }
+ZipWriter::ZipWriter(std::filesystem::path path) : path_(std::move(path)) { fail(); }
 
 ZipWriter::~ZipWriter() = default;
 
