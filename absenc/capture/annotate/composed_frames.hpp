@@ -43,7 +43,7 @@ class ComposedFrames final : public AnnotationSink {
 
   void report(const Composed& one, Tick end) {
     using Kind = Annotation::Kind;
-    const std::uint64_t ago = count_ - one.first;
+    const auto ago = static_cast<std::size_t>(count_ - one.first);
     Annotation annotation{.kind = one.request.empty() ? Kind::reply : Kind::exchange,
                           .error = one.error,
                           .composed = true,

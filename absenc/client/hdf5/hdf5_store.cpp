@@ -119,7 +119,10 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   for (; one != blocks_.end() && one->first < at + bytes.size(); ++one) {
     const std::uint64_t from = std::max(at, one->first);
     const std::uint64_t to = std::min(at + bytes.size(), one->first + one->second.bytes.size());
-    if (from < to) std::memcpy(&bytes[from - at], &one->second.bytes[from - one->first], to - from);
+    if (from >= to) continue;
+    const auto place = static_cast<std::size_t>(from - at);
+    const auto within = static_cast<std::size_t>(from - one->first);
+    std::memcpy(&bytes[place], &one->second.bytes[within], static_cast<std::size_t>(to - from));
   }
 }
 
