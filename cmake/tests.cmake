@@ -121,7 +121,7 @@ function(absenc_keep_tests_for_windows list_of_sources)
   set(kept)
   foreach(source IN LISTS ${list_of_sources})
     file(STRINGS "${source}" needs LIMIT_COUNT 1 REGEX
-         "include [<\"](rapidcheck|zip\\.h|unistd\\.h|fcntl\\.h|sys/|pthread\\.h|tests/ftdi|absenc/capture/files/(test_files|zip_archive)|absenc/os/(linux|fake_ftdi))|mkdtemp\\(|setenv\\(")
+         "include [<\"](rapidcheck|zip\\.h|unistd\\.h|fcntl\\.h|sys/|pthread\\.h|tests/ftdi|absenc/capture/files/(test_files|zip_archive)|absenc/client/hdf5|absenc/os/(linux|fake_ftdi))|mkdtemp\\(|setenv\\(")
     if(NOT needs AND NOT source MATCHES "/absenc/os/linux/")
       list(APPEND kept "${source}")
     endif()

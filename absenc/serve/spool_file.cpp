@@ -82,7 +82,7 @@ SpoolFile::SpoolFile(const std::string& path, const SpoolFacts& facts) : log_(pa
 }
 
 SpoolFile::SpoolFile(const std::string& path) : log_(path, os::LogFile::Open::existing) {
-  const std::optional<Record> first = read_record(0);
+  const std::optional<StoredRecord> first = read_record(0);
   if (!first || first->kind != kind_format || first->body.size() != sizeof newest_format) return;
   const std::uint32_t format = FieldReader(first->body).number();
   if (format > newest_format) {
@@ -94,7 +94,7 @@ SpoolFile::SpoolFile(const std::string& path) : log_(path, os::LogFile::Open::ex
 }
 
 // Returns the record at `offset`; nothing at the end of the file or if the record is damaged.
-std::optional<SpoolFile::Record> SpoolFile::read_record(std::size_t offset) const {
+std::optional<SpoolFile::StoredRecord> SpoolFile::read_record(std::size_t offset) const {
   const std::string head = log_.read(offset, head_bytes);
   if (head.size() < head_bytes) return {};
   FieldReader numbers(head.substr(0, kind_at));
@@ -103,12 +103,12 @@ std::optional<SpoolFile::Record> SpoolFile::read_record(std::size_t offset) cons
   if (size > largest_body) return {};
   std::string body = log_.read(offset + head_bytes, size);
   if (body.size() < size || checksum(head[kind_at], body) != sum) return {};
-  return Record{head[kind_at], head[arrived_at] == has_arrived, std::move(body), offset + head_bytes + size};
+  return StoredRecord{head[kind_at], head[arrived_at] == has_arrived, std::move(body), offset + head_bytes + size};
 }
 
 std::optional<SpoolFile::StoredMessage> SpoolFile::next(std::size_t& offset, SpoolFacts* facts) const {
   try {
-    while (std::optional<Record> record = read_record(offset)) {
+    while (std::optional<StoredRecord> record = read_record(offset)) {
       const std::size_t at = offset;
       FieldReader fields(std::move(record->body));
       if (record->kind == kind_message) {

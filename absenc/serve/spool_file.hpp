@@ -69,13 +69,13 @@ class SpoolFile {
   [[nodiscard]] int mark_arrived(std::size_t offset) const;
 
  private:
-  struct Record {
+  struct StoredRecord {
     char kind = 0;
     bool arrived = false;
     std::string body{};
     std::size_t end = 0;  // offset of the next record
   };
-  [[nodiscard]] std::optional<Record> read_record(std::size_t offset) const;
+  [[nodiscard]] std::optional<StoredRecord> read_record(std::size_t offset) const;
 
   os::LogFile log_;
 };

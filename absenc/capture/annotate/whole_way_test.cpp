@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -168,7 +169,7 @@ TEST_P(WholeWay, EqualsDirectAnnotation) {
   expect_same(*open_capture(source(vcd), "capture.vcd", {}), expected);
   expect_same(*open_capture(source(csv), "capture.csv", {}), expected);
   const os::testing::TemporaryDirectory directory;
-  const std::string session = directory.path() / "capture.sr";
+  const std::filesystem::path session = directory.path() / "capture.sr";
   write_sigrok(session, drawing, std::uint64_t{32} * line.rate);
   expect_same(*open_capture(session, {}), expected);
 }
