@@ -259,12 +259,20 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS AND NOT WIN32)
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
-  set(tested_command "${absenc_bin_dir}/absenc")
-  if(CMAKE_CROSSCOMPILING)  # a script that runs the command in the emulator
-    set(tested_command "${CMAKE_CURRENT_BINARY_DIR}/emulated/absenc")
+  set(python_environment "ABSENC=${absenc_bin_dir}/absenc")
+  if(CMAKE_CROSSCOMPILING)  # a script that runs the command in qemu
+    add_library(emulated_termios2 MODULE tests/emulated/termios2.cpp)
+    absenc_settings(emulated_termios2)
+    set(in_qemu "${CMAKE_CURRENT_BINARY_DIR}/emulated/absenc")
+    set(python_environment "ABSENC=${in_qemu}" ABSENC_IN_QEMU=1)
     list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
-    file(CONFIGURE OUTPUT "${tested_command}" CONTENT "#!/bin/sh\nexec ${emulator} ${absenc_bin_dir}/absenc \"$@\"\n" @ONLY)
-    file(CHMOD "${tested_command}" FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
+    # qemu cannot start programs, so the script starts what `absenc serve` would start
+    file(GENERATE OUTPUT "${in_qemu}" CONTENT
+"#!/bin/sh
+program=${absenc_bin_dir}/absenc
+[ \"$1\" != serve ] || program=${absenc_private_dir}/absenc-serve
+exec ${emulator} -E LD_PRELOAD=$<TARGET_FILE:emulated_termios2> $program \"$@\"
+" FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
   endif()
   file(GLOB abuse_lists CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/abuse/*_abuse.py")
   foreach(source IN LISTS python_tests abuse_lists)
@@ -273,7 +281,7 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS AND NOT WIN32)
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
       # ABSENC_BUSY_SECONDS relaxes time limits, because other tests run at the same time.
-      ENVIRONMENT "ABSENC=${tested_command};ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
+      ENVIRONMENT "${python_environment};ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
       COST 100  # Python tests start first, because they mostly wait and leave the processor to others
       TIMEOUT 900)  # time limit in seconds, long enough for a busy machine
     if(name IN_LIST absenc_long_python_tests)

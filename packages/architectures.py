@@ -40,6 +40,7 @@ class Architecture:
             run("mmdebstrap", "--variant=extract", f"--architectures={self.name}", f"--include={','.join(SYSROOT_PACKAGES)}",
                 "bookworm", root)
             relative_links(root)
+            shutil.rmtree(root / "dev")  # the emulators would open its devices in place of those of this computer
             made_of.write_text(wanted)
         return root
 

@@ -53,6 +53,8 @@ def end(process, number=signal.SIGTERM):
 
 def wait_for_handler(process):
     """Waits until the process has a handler for SIGINT. Before that, SIGINT would kill the process."""
+    if os.environ.get("ABSENC_IN_QEMU"):
+        raise unittest.SkipTest("qemu itself handles every signal, so nothing shows when the command does")
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         with open(f"/proc/{process.pid}/status", encoding="ascii") as file:
