@@ -97,7 +97,7 @@ class Artefacts(unittest.TestCase):
 
     def test_readme_names_what_is_there(self):
         section = (SOURCE / "README.md").read_text().split("## Install\n")[1].split("\n## ")[0]
-        names = set(re.findall(r"(absenc[\w.-]*(?:\.deb|\.whl|\.tar\.gz))|(?<=\./)([\w.-]+\.deb)", section))
+        names = set(re.findall(r"(absenc[\w.-]*(?:\.deb|\.whl|\.tar\.gz|\.zip))|(?<=\./)([\w.-]+\.deb)", section))
         named = {one or other for one, other in names}
         self.assertGreater(len(named), 6)
         self.assertEqual({name for name in named if not (RELEASE / name).is_file()}, set())
