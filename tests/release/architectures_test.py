@@ -12,7 +12,7 @@ from root_support import ISOLATED, SOURCE, VERSION, RootCase, WholeInstallation,
 sys.path.insert(0, str(SOURCE / "packages"))
 from architectures import BIG_ENDIAN, PUBLISHED, build_tree
 
-# Tests that are left out in an emulator, by their reasons. Those that run have 60 programs and modules.
+# Tests that are left out in an emulator, by their reasons.
 LEFT_OUT = {
     "qemu has neither the calls for SPI controllers nor those for rates, which tests/emulated/termios2.cpp replaces for the "
     "command alone, within one process":
@@ -20,7 +20,7 @@ LEFT_OUT = {
     "the emulated program starts other programs, or a script of this computer loads it":
         r"(bug_report|first_minutes|keys|mqtt_.*|readme|serve_.*)\.py",
     "they expect times that an emulated program, which starts in half a second, does not keep":
-        r"(campaign|doctor|emulate|encolink_command|monitor|nikon|realtime|record|restless_line|three_states)\.py",
+        r"(campaign|doctor|emulate|encolink_command|monitor|nikon|realtime|record|three_states)\.py",
     "they read the sources, as they do on this computer":
         r"(compiled_together|ftdi_wave|include_direction|stability|tables|type_names|unit_declaration|usage|word)\.py",
 }
