@@ -21,7 +21,7 @@ set(absenc_system_libraries ws2_32 setupapi)
 
 # Libraries without a mingw package in Debian, each in a folder (packages/windows/libraries.py). Only what includes their
 # headers links this target, so that a new version of one of them does not compile everything anew.
-if(NOT ABSENC_WINDOWS_LIBRARIES)
+if(NOT ABSENC_WINDOWS_LIBRARIES AND (ABSENC_COMMAND OR ABSENC_ZIP OR ABSENC_HDF5))
   message(FATAL_ERROR "ABSENC_WINDOWS_LIBRARIES is empty: ./dev windows builds these libraries and sets it")
 endif()
 add_library(absenc-windows-libraries INTERFACE)

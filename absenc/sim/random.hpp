@@ -31,6 +31,7 @@ class Random {
     while (value < uneven) value = next();
     return static_cast<T>(value % limit);
   }
+  /// The same for a limit that is written as a number; it must be above 0.
   constexpr std::uint64_t below(int limit) { return below(static_cast<std::uint64_t>(limit)); }
 
   /// Returns true with the given probability: 0 never, 1 always.
