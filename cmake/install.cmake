@@ -35,7 +35,7 @@ absenc_pkgconfig(absenc "${PROJECT_DESCRIPTION}" "" absenc)
 if(TARGET absenc-client)
   set(same "= ${PROJECT_VERSION}")
   absenc_pkgconfig(absenc-client "Absolute encoders by address: read, set up, emulate" "absenc ${same}"
-                   absenc-client absenc-search absenc-os ${absenc_windows_libraries})
+                   absenc-client absenc-search absenc-os ${absenc_system_libraries})
   absenc_pkgconfig(absenc-configuration "Names of absenc.toml for absenc-client" "absenc-client ${same}"
                    absenc-configuration)
   set(zip_libraries)
