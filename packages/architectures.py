@@ -12,7 +12,7 @@ TREES = ROOT / "build/release-trees"
 # The packages whose headers and libraries the cross-compilers need, and whose programs and libraries the emulators run.
 SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
     libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
-    libmosquitto-dev libpython3.11-dev pybind11-dev libjs-dygraphs python3.11-minimal
+    libmosquitto-dev libpython3.11-dev pybind11-dev libjs-dygraphs python3-numpy
     libgtest-dev libgmock-dev librapidcheck-dev libzip-dev""".split()
 
 
