@@ -63,13 +63,14 @@ class Emulated:
             subprocess.run(["dpkg-deb", "-x", artefact(f"{package}_*_{cls.architecture.name}.deb"), packages], check=True)
         emulator = " ".join(cls.architecture.emulated())
         sysroot = cls.architecture.sysroot()
+        libraries = sysroot / "usr/lib" / cls.architecture.tuple  # NumPy's are in folders of their own in it
         (cls.root / "srv/bin").mkdir()
         # the emulator cannot start programs, so the script starts what `absenc serve` would start
         cls.write_program("absenc", f"""program=bin/absenc
             [ "$1" != serve ] || program=lib/absenc/absenc-serve
             exec {emulator} /srv/packages/usr/$program "$@\"""")
         cls.write_program("python3", f"""export PYTHONPATH=/srv/packages/usr/lib/python3/dist-packages
-            exec {emulator} {sysroot}/usr/bin/python3.11 "$@\"""")
+            exec {emulator} -E LD_LIBRARY_PATH={libraries}/blas:{libraries}/lapack {sysroot}/usr/bin/python3.11 "$@\"""")
 
     @classmethod
     def write_program(cls, name, script):
