@@ -4,9 +4,11 @@
 
 #include <zip.h>
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -148,15 +150,15 @@ inline std::string sigrok_metadata(std::string_view rate, unsigned channels, uns
   return text + "unitsize=" + std::to_string(unit_size) + "\n";
 }
 
-/// Writes text and numbers, in the computer's own byte order, for tests of binary files.
+/// Writes text, and numbers with their least significant byte first, for tests of binary files.
 struct BinaryWriter {
   FileBytes bytes;
 
   template <class Number>
   BinaryWriter& put(Number number) {
-    const std::size_t at = bytes.size();
-    bytes.resize(at + sizeof(number));
-    std::memcpy(&bytes[at], &number, sizeof(number));
+    auto part = std::bit_cast<std::array<std::uint8_t, sizeof(Number)>>(number);
+    if constexpr (std::endian::native == std::endian::big) std::reverse(part.begin(), part.end());
+    bytes.insert(bytes.end(), part.begin(), part.end());
     return *this;
   }
   BinaryWriter& text(std::string_view text) {

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "absenc/core/bits.hpp"
+
 // This file is compiled once for each instruction set (hwy/foreach_target.h): the compiler's own, SSE4 and AVX2.
 // AVX-512 and SVE are not faster here.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE_256 | HWY_SVE2 | HWY_SVE2_128)
@@ -30,10 +32,10 @@ constexpr std::size_t piece = 64 * word;
 template <class T>
 HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T channel_bit) {
   std::uint64_t bits = 0;
-  if constexpr (HWY_TARGET == HWY_SCALAR) {
+  // Samples have their least significant byte first, and so have the masks that Highway stores.
+  if constexpr (HWY_TARGET == HWY_SCALAR || std::endian::native != std::endian::little) {
     for (std::size_t i = 0; i < word; ++i) {
-      T sample;
-      std::memcpy(&sample, samples + i * sizeof(T), sizeof(T));
+      const auto sample = static_cast<T>(load_little_endian(Bytes(samples + i * sizeof(T), sizeof(T))));
       bits |= static_cast<std::uint64_t>((sample & channel_bit) != 0) << i;
     }
   } else {
