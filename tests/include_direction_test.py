@@ -113,7 +113,7 @@ def system_fault(path, header):
         return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
     if is_public(path) and re.search(r"[/.]", header):
         return "is no header of C++: not for a public header"
-    of_system = system_of(path) or path.parts[0] == "bench" or path.parts[:2] == ("tests", "vm")
+    of_system = system_of(path) or path.parts[0] == "bench" or path.parts[:2] in (("tests", "vm"), ("tests", "emulated"))
     return "belongs into a folder of absenc/os" if OS_HEADER.search(header) and not of_system else None
 
 
