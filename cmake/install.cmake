@@ -11,6 +11,13 @@ foreach(name IN ITEMS os search client configuration capture captures recording 
     list(APPEND absenc_libraries absenc-${name})
   endif()
 endforeach()
+if(WIN32)  # packages/windows/pack.py puts the libraries that it has built beside those of absenc
+  foreach(name IN ITEMS capture hdf5)
+    if(TARGET absenc-${name})
+      target_link_directories(absenc-${name} INTERFACE $<INSTALL_INTERFACE:$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>)
+    endif()
+  endforeach()
+endif()
 install(TARGETS ${absenc_libraries} EXPORT absenc ARCHIVE COMPONENT libabsenc-dev
         FILE_SET HEADERS COMPONENT libabsenc-dev)
 install(EXPORT absenc NAMESPACE absenc:: FILE absencConfig.cmake DESTINATION "${absenc_package_dir}"

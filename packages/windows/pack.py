@@ -5,6 +5,7 @@
 Packs absenc.exe and the C++ library of the build tree TREE into two archives in TREE. FOLDER...: the folders that
 libraries.py prints, whose code absenc.exe contains."""
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,8 @@ WINDOWS = {"advapi32.dll", "kernel32.dll", "msvcrt.dll", "setupapi.dll", "shell3
 # Packages of Debian whose code absenc.exe contains, besides the libraries that are built for it.
 INSIDE = ["libfmt-dev", "nlohmann-json3-dev", "libtomlplusplus-dev", "libhwy-dev", "libz-mingw-w64-dev", "libjs-dygraphs",
           "gcc-mingw-w64-base", "mingw-w64-x86-64-dev"]
+# Source packages of the libraries that absenc::captures and absenc::hdf5 link.
+LINKED_BY_THE_LIBRARY = ["hdf5", "libdeflate", "minizip"]
 
 
 def name_of(folder):
@@ -49,11 +52,15 @@ def command(tree):
         return stripped.read_bytes()
 
 
-def library(tree):
-    """Returns the files of the C++ library."""
+def library(tree, folders):
+    """Returns the files of the C++ library, with those libraries that it links and that are built for it."""
     with tempfile.TemporaryDirectory() as scratch:
         subprocess.run(["cmake", "--install", tree, "--component", "libabsenc-dev", "--prefix", scratch], check=True,
                        capture_output=True)
+        for folder in folders:
+            if name_of(folder) in LINKED_BY_THE_LIBRARY:
+                for archive in (folder / "lib").glob("*.a"):
+                    shutil.copy(archive, Path(scratch) / "lib")
         return {path.relative_to(scratch).as_posix(): (path.read_bytes(), 0o644)
                 for path in Path(scratch).rglob("*") if path.is_file()}
 
@@ -68,7 +75,7 @@ def pack(tree, folders):
         "README.md": ((ROOT / "docs/windows.md").read_bytes(), 0o644),
     }
     paths = []
-    for name, files in ((name, program), (f"{name}-dev", library(tree))):
+    for name, files in ((name, program), (f"{name}-dev", library(tree, folders))):
         paths.append(tree / f"{name}.zip")
         write_zip(paths[-1], {f"{name}/{file}": content for file, content in {**files, **common}.items()})
     return paths
