@@ -6,6 +6,7 @@ import json
 import os
 import re
 import select
+import shlex
 import shutil
 import signal
 import subprocess
@@ -49,6 +50,15 @@ def end(process, number=signal.SIGTERM):
         process.send_signal(number)
     out, err = process.communicate(timeout=PATIENCE)
     return process.returncode, out.decode(), err.decode()
+
+
+def run_tool(*command, timeout=100, **settings):
+    """Runs a program, such as a compiler, that must succeed, and returns its standard output."""
+    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          timeout=timeout, check=False, **settings)
+    if done.returncode != 0:
+        raise AssertionError(f"{shlex.join(map(str, command))}\n{done.stdout}\n{done.stderr}")
+    return done.stdout
 
 
 def wait_for_handler(process):

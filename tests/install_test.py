@@ -4,7 +4,6 @@ import gzip
 import json
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import tempfile
@@ -12,7 +11,7 @@ import unittest
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from command_support import absenc
+from command_support import absenc, run_tool
 
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
@@ -226,14 +225,6 @@ _absenc absenc
 """
 
 
-def run(*command, timeout=100, **settings):
-    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                          timeout=timeout, **settings)
-    if done.returncode != 0:
-        raise AssertionError(f"{shlex.join(map(str, command))}\n{done.stdout}\n{done.stderr}")
-    return done.stdout
-
-
 def files_below(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if not path.is_dir()}
 
@@ -241,7 +232,7 @@ def files_below(folder):
 def pkg_config(root, *arguments):
     """Returns the words that pkg-config prints for the library installed below `root`."""
     [pc] = root.rglob("absenc.pc")
-    return run("pkg-config", *arguments, env={**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}).split()
+    return run_tool("pkg-config", *arguments, env={**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}).split()
 
 
 def public_headers():
@@ -266,7 +257,7 @@ class Case(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="absenc-install-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cmake", "--install", BUILD, "--prefix", cls.folder / "first")
+        run_tool("cmake", "--install", BUILD, "--prefix", cls.folder / "first")
         cls.root = (cls.folder / "first").rename(cls.folder / "moved")
 
 
@@ -316,9 +307,9 @@ class Installed(Case):
                 self.assertNotIn(str(place).encode() + b"/", content, path)
 
     def test_command_runs(self):
-        self.assertRegex(run(self.root / "bin/absenc", "--version"),
+        self.assertRegex(run_tool(self.root / "bin/absenc", "--version"),
                          rf"\Aabsenc {VERSION}\ncommit \w+\nfor {os.uname().machine}\nbuilt in: .+\n\Z")
-        self.assertIn("0 turns", run(self.root / "bin/absenc", "read", "sim:tformat"))
+        self.assertIn("0 turns", run_tool(self.root / "bin/absenc", "read", "sim:tformat"))
 
     def test_cmake_project_finds_package(self):
         project = self.folder / "project"
@@ -326,26 +317,26 @@ class Installed(Case):
         (project / "CMakeLists.txt").write_text(PROJECT)
         (project / "firmware.cpp").write_text(FIRMWARE)
         (project / "extended.cpp").write_text(EXTENDED)
-        run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.root}")
-        run("cmake", "--build", project / "build")
-        self.assertRegex(run(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
-        self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
+        run_tool("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.root}")
+        run_tool("cmake", "--build", project / "build")
+        self.assertRegex(run_tool(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
+        self.assertEqual(run_tool(project / "build/firmware"), FIRMWARE_SAYS)
         self.assert_is_small(project / "build/by_name")
         self.assert_is_extended(project / "build/extended", project)
 
     def assert_is_small(self, program):
         """Asserts that the program loads only libraries of C and C++, and contains no other library either."""
-        loaded = {Path(line.split()[0]).name.split(".so")[0] for line in run("ldd", program).splitlines()}
+        loaded = {Path(line.split()[0]).name.split(".so")[0] for line in run_tool("ldd", program).splitlines()}
         self.assertIn("libstdc++", loaded)
         self.assertEqual(loaded - STANDARD, set())
-        symbols = run("nm", "-C", program)
+        symbols = run_tool("nm", "-C", program)
         self.assertIn("absenc::client::", symbols)
         self.assertEqual({found[0] for found in FOREIGN.finditer(symbols)}, set())
 
     def assert_is_extended(self, program, folder):
         (folder / "absenc.toml").write_text('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n')
         for name in ("log.csv", "log.h5"):
-            said = run(program, folder / f"{program.name}-{name}", SOURCE / "examples/tformat.txt",
+            said = run_tool(program, folder / f"{program.name}-{name}", SOURCE / "examples/tformat.txt",
                        env={**os.environ, "ABSENC_CONFIG": str(folder / "absenc.toml")})
             self.assertRegex(said, r"^1 \S+")
         self.assertEqual((folder / f"{program.name}-log.h5").read_bytes()[:4], b"\x89HDF")
@@ -355,7 +346,7 @@ class Installed(Case):
         source.write_text(EACH_PLACE)
         program = self.program("each_place", source, "absenc-client")
         self.assert_is_small(program)
-        said = run(program, "tformat:/dev/ttyNONE", "tformat:tcp:127.0.0.1:1", "ssi:spi:/dev/spidevNONE",
+        said = run_tool(program, "tformat:/dev/ttyNONE", "tformat:tcp:127.0.0.1:1", "ssi:spi:/dev/spidevNONE",
                    "raa38-can:canNONE", "elbow", "raa38:/dev/null?baud=115200&trigger=gpio:X").splitlines()
         for line, expected in zip(said, ("/dev/ttyNONE", "127.0.0.1 port 1", "/dev/spidevNONE", "can",
                                          "build it with absenc::configuration"), strict=False):
@@ -364,18 +355,18 @@ class Installed(Case):
 
     def program(self, name, source, *libraries):
         """Compiles a program, and links it with the flags that pkg-config prints for `libraries`."""
-        run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", *libraries), "-o",
+        run_tool("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", *libraries), "-o",
             self.folder / name)
         return self.folder / name
 
     def test_programs_build_with_pkg_config(self):
         firmware = self.folder / "firmware.cpp"
         firmware.write_text(FIRMWARE)
-        self.assertRegex(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
-        self.assertEqual(run(self.program("firmware", firmware, "absenc")), FIRMWARE_SAYS)
+        self.assertRegex(run_tool(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
+        self.assertEqual(run_tool(self.program("firmware", firmware, "absenc")), FIRMWARE_SAYS)
         endings = self.folder / "endings.cpp"
         endings.write_text(ENDINGS)
-        self.assertEqual(run(self.program("endings", endings, "absenc-client")), ENDINGS_SAY)
+        self.assertEqual(run_tool(self.program("endings", endings, "absenc-client")), ENDINGS_SAY)
         extended = self.folder / "extended.cpp"
         extended.write_text(EXTENDED)
         self.assert_is_extended(self.program("extended_by_pkg_config", extended, "absenc-configuration", "absenc-captures",
@@ -392,8 +383,8 @@ class Installed(Case):
         parent.mkdir()
         (parent / "CMakeLists.txt").write_text(PARENT)
         for client in ("OFF", "ON"):
-            run("cmake", "-G", "Ninja", "-S", parent, "-B", parent / "build", f"-DABSENC_CLIENT={client}")
-        run("cmake", "--install", parent / "build", "--prefix", parent / "installed")
+            run_tool("cmake", "-G", "Ninja", "-S", parent, "-B", parent / "build", f"-DABSENC_CLIENT={client}")
+        run_tool("cmake", "--install", parent / "build", "--prefix", parent / "installed")
         self.assertEqual(files_below(parent / "installed"), set())
         self.assertFalse((parent / "build/CPackConfig.cmake").exists())
 
@@ -434,7 +425,7 @@ class ManPage(Case):
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
 
     def test_is_found_by_name(self):
-        self.assertIn('"absenc - ', run("lexgrog", self.path))
+        self.assertIn('"absenc - ', run_tool("lexgrog", self.path))
 
     def test_guide_has_no_warnings(self):
         self.assertGreater(len(GUIDE), 15)
@@ -444,7 +435,7 @@ class ManPage(Case):
                 self.assertEqual(self.shown("--warnings=w", path=path).stderr, "")
                 done = subprocess.run(["groff", "-t", "-man", "-ww", "-z", "-Tutf8", path], capture_output=True, text=True, timeout=60)
                 self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
-                self.assertIn(f'"{path.stem} - ', run("lexgrog", path))
+                self.assertIn(f'"{path.stem} - ', run_tool("lexgrog", path))
 
     def test_guide_shows_headings_code_and_tables(self):
         text = self.shown(path=self.root / "share/man/man7/absenc-read.7").stdout
@@ -480,11 +471,11 @@ class ManPage(Case):
 class Completion(Case):
     def complete(self, *words):
         script = self.root / "share/bash-completion/completions/absenc"
-        return run("bash", "-u", "-c", COMPLETE, "bash", script, *words).splitlines()
+        return run_tool("bash", "-u", "-c", COMPLETE, "bash", script, *words).splitlines()
 
     def test_is_bound_to_command(self):
         script = self.root / "share/bash-completion/completions/absenc"
-        self.assertIn("-F _absenc absenc", run("bash", "-c", 'source "$1"; complete -p absenc', "bash", script))
+        self.assertIn("-F _absenc absenc", run_tool("bash", "-c", 'source "$1"; complete -p absenc', "bash", script))
 
     def test_completes_verbs_and_options(self):
         offered = self.complete("")
@@ -535,16 +526,16 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="absenc-package-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cpack", "--config", BUILD / "CPackConfig.cmake", "-B", cls.folder, umask=0o077, timeout=400)
+        run_tool("cpack", "--config", BUILD / "CPackConfig.cmake", "-B", cls.folder, umask=0o077, timeout=400)
         cls.packages = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
         for name, package in cls.packages.items():
-            run("dpkg-deb", "-x", package, cls.folder / name)
+            run_tool("dpkg-deb", "-x", package, cls.folder / name)
         cls.command = cls.folder / "absenc/usr"
         cls.development = cls.folder / "libabsenc-dev/usr"
         cls.python = cls.folder / "python3-absenc/usr"
 
     def field(self, package, name):
-        return run("dpkg-deb", "-f", self.packages[package], name).strip()
+        return run_tool("dpkg-deb", "-f", self.packages[package], name).strip()
 
     def depends(self, package):
         return set(re.findall(r"[a-z0-9.+-]+(?= \(|,|$)", self.field(package, "Depends")))
@@ -558,13 +549,13 @@ class Packages(unittest.TestCase):
                 self.assertEqual(self.field(name, "Package"), name)
                 self.assertEqual(self.field(name, "Version"), VERSION)
                 self.assertEqual(self.field(name, "Section"), section)
-                self.assertEqual(self.field(name, "Architecture"), run("dpkg", "--print-architecture").strip())
+                self.assertEqual(self.field(name, "Architecture"), run_tool("dpkg", "--print-architecture").strip())
                 self.assertRegex(self.field(name, "Maintainer"), r"^absenc developers <\S+@\S+>$")
                 self.assertRegex(self.field(name, "Description"), r"\A[A-Z].+[^.]\n .+")
         self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), len(sections))
 
     def test_command_loads_few_libraries(self):
-        loaded = [line.split()[0] for line in run("ldd", self.command / "bin/absenc").splitlines()]
+        loaded = [line.split()[0] for line in run_tool("ldd", self.command / "bin/absenc").splitlines()]
         self.assertLessEqual(len(loaded), 20)
         self.assertEqual([name for name in loaded if re.search("hdf5|curl|gnutls|ldap|microhttpd|sqlite|mosquitto", name)], [])
 
@@ -581,15 +572,15 @@ class Packages(unittest.TestCase):
         linked = [flag[2:] for name in PKG_CONFIG for flag in pkg_config(self.development, "--libs", name)
                   if flag.startswith("-l") and not flag.startswith("-labsenc")]
         self.assertGreater(len(linked), 3)
-        files = [os.path.normpath(run("g++", f"-print-file-name=lib{name}.so").strip()) for name in linked]
-        owners = {run("dpkg", "-S", file).split(":")[0] for file in files}
+        files = [os.path.normpath(run_tool("g++", f"-print-file-name=lib{name}.so").strip()) for name in linked]
+        owners = {run_tool("dpkg", "-S", file).split(":")[0] for file in files}
         suggested = set(self.field("libabsenc-dev", "Suggests").split(", "))
         # zlib1g-dev is not suggested, because libminizip-dev depends on it
         self.assertEqual(suggested, owners - {"zlib1g-dev"})
         self.assertEqual(self.field("libabsenc-dev", "Depends"), "")
 
     def test_each_installed_file_is_in_one_package(self):
-        run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
+        run_tool("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
         installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1", *GUIDE}
         own = {f"share/doc/{name}/{file}" for name in self.packages for file in ("copyright", "changelog.gz")}
         overrides = {f"share/lintian/overrides/{path.stem}" for path in (SOURCE / "cmake/debian").glob("*.lintian-overrides")}
@@ -606,13 +597,13 @@ class Packages(unittest.TestCase):
 
     def test_files_belong_to_root_and_are_readable(self):
         for package in self.packages.values():
-            for line in run("dpkg-deb", "-c", package).splitlines():
+            for line in run_tool("dpkg-deb", "-c", package).splitlines():
                 mode = "-rwxr-xr-x" if line.endswith(("bin/absenc", "/absenc-serve")) else "-rw-r--r--"
                 mode = "drwxr-xr-x" if line.endswith("/") else mode
                 self.assertTrue(line.startswith(f"{mode} root/root "), line)
 
     def test_unpacked_command_runs(self):
-        self.assertIn("turns", run(self.command / "bin/absenc", "read", "sim:tformat"))
+        self.assertIn("turns", run_tool(self.command / "bin/absenc", "read", "sim:tformat"))
 
     def test_command_without_its_parts_says_what_to_install(self):
         for arguments, package in ((("serve",), "absenc-serve"),
@@ -620,14 +611,14 @@ class Packages(unittest.TestCase):
             done = subprocess.run([self.command / "bin/absenc", *arguments], capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertIn(f"Install the package {package}", done.stderr)
-        self.assertIn("--history", run(self.command / "bin/absenc", "serve", "--help"))
+        self.assertIn("--history", run_tool(self.command / "bin/absenc", "serve", "--help"))
         self.assertFalse((self.folder / "x.h5").exists())
 
     def test_unpacked_module_runs(self):
         for package in ("libc6", "python3", "python3-numpy"):
             self.assertIn(package, self.field("python3-absenc", "Depends"))
         modules = self.python / "lib/python3/dist-packages"
-        run("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",
+        run_tool("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",
             "import absenc; assert absenc.open('sim:tformat').read().valid")
 
     def test_unpacked_documents_are_complete(self):

@@ -3,11 +3,10 @@
 """Compiles the library with one protocol for Windows, and reads an encoder through a COM port under wine. All of
 absenc.exe is in windows_test.py, which ./dev windows --test runs."""
 import os
-import subprocess
 import unittest
 from pathlib import Path
 
-from command_support import ABSENC, Emulator, EncoderCase
+from command_support import ABSENC, Emulator, EncoderCase, run_tool
 from wine_support import WINE, Prefix
 
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
@@ -28,24 +27,16 @@ target_link_options(outside PRIVATE -static)
 """
 
 
-def run(*command, **settings):
-    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                          check=False, **settings)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}\n{done.stdout}\n{done.stderr}")
-    return done.stdout
-
-
 class WindowsLibrary(EncoderCase):
     def test_program_reads_through_a_com_port(self):
         BUILD.mkdir(parents=True, exist_ok=True)
         (BUILD / "CMakeLists.txt").write_text(PROJECT, encoding="utf-8")
-        run("cmake", "-G", "Ninja", "-S", BUILD, "-B", BUILD / "build",
-            *(f"-D{name}={value}" for name, value in SETTINGS.items()))
-        run("cmake", "--build", BUILD / "build", "-j", "2", timeout=800)
+        run_tool("cmake", "-G", "Ninja", "-S", BUILD, "-B", BUILD / "build",
+                 *(f"-D{name}={value}" for name, value in SETTINGS.items()))
+        run_tool("cmake", "--build", BUILD / "build", "-j", "2", timeout=800)
         with Prefix() as prefix, Emulator(self.directory, "--singleturn", "65536") as emulator:
             prefix.link_port(5, emulator.path)
-            output = run(WINE, BUILD / "build/outside.exe", "tformat:COM5?latency=300", env=prefix.environment, timeout=60)
+            output = run_tool(WINE, BUILD / "build/outside.exe", "tformat:COM5?latency=300", env=prefix.environment)
         self.assertRegex(output, r"^(180\.0000 degrees\n)+0\.0 rpm, within \d")
 
 

@@ -24,7 +24,7 @@ import zipfile
 import h5py
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
-from command_support import read_line
+from command_support import read_line, run_tool
 from decode_file_test import conversation
 from monitor_test import Terminal
 from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
@@ -619,11 +619,6 @@ int main(int, char** arguments) try {
 }
 """
 
-    def run_here(self, *command):
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=5 * PATIENCE,
-                              check=False)
-        self.assert_good(done)
-
     def test_program_finds_the_library_and_reads(self):
         root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
         with open(os.path.join(root, "VERSION"), encoding="utf-8") as file:
@@ -633,10 +628,10 @@ int main(int, char** arguments) try {
             archive.extractall(self.directory)
         self.file("CMakeLists.txt", self.PROJECT.format(version=version))
         self.file("outside.cpp", self.PROGRAM)
-        self.run_here("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
+        run_tool("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
                       "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
                       "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
-        self.run_here("cmake", "--build", self.file("build"))
+        run_tool("cmake", "--build", self.file("build"))
         com = self.at_com("--singleturn", "65536")
         port = re.search(r"COM\d+", com)[0]
         self.file("absenc.toml", f'[encoder.elbow]\nprotocol = "tformat"\nport = "{port}"\nlatency = 300\n')

@@ -83,4 +83,4 @@ def pack(tree, folders):
 
 if __name__ == "__main__":
     for path in pack(Path(sys.argv[1]).resolve(), [Path(folder) for folder in sys.argv[2:]]):
-        print(f"packed {path.name}, {path.stat().st_size} bytes")
+        print(f"packed {path.relative_to(ROOT)}, {path.stat().st_size} bytes")

@@ -27,7 +27,7 @@ LEFT_OUT = {
 
 
 def run_tests(tree, *options):
-    """Runs the tests of a build tree and returns the last lines of ctest."""
+    """Runs the tests of a build tree and returns their number."""
     environment = {**os.environ, "ABSENC_CASES_PERCENT": "10", "RC_PARAMS": "max_success=20"}
     done = subprocess.run(["ctest", "--test-dir", tree, "-j", str(os.cpu_count()), "--output-on-failure", "-LE", "long", *options],
                           capture_output=True, text=True, env=environment, check=False)

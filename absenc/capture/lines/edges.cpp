@@ -10,7 +10,6 @@
 #include "absenc/core/bits.hpp"
 
 // This file is compiled once for each instruction set (hwy/foreach_target.h): the compiler's own, SSE4 and AVX2.
-// AVX-512 and SVE are not faster here.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE_256 | HWY_SVE2 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "absenc/capture/lines/edges.cpp"
@@ -142,12 +141,14 @@ std::span<const ChangeFinder> change_finders() {
     std::vector<ChangeFinder> found;
 #if HWY_TARGETS & HWY_AVX2
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
-        __builtin_cpu_supports("fma") && __builtin_cpu_supports("pclmul")) {
+        __builtin_cpu_supports("fma") && __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("aes")) {
       found.push_back(N_AVX2::find);
     }
 #endif
 #if HWY_TARGETS & HWY_SSE4
-    if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("pclmul")) found.push_back(N_SSE4::find);
+    if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("aes")) {
+      found.push_back(N_SSE4::find);
+    }
 #endif
     found.push_back(HWY_STATIC_DISPATCH(find));
     return found;

@@ -131,7 +131,7 @@ class Doctor {
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
     // With rs485=on and rs485=rts the port opens only if RTS switches the direction.
     const bool by_rts = address_.rs485 == os::Rs485::on || address_.rs485 == os::Rs485::rts;
-    seen_.facts.kernel_direction = now.kernel_direction.value_or(false) || by_rts;
+    seen_.facts.kernel_direction = by_rts ? true : now.kernel_direction;
     // the earlier value may be out of date: absenc may have shortened the driver's latency timer when it opened the
     // port
     seen_.facts.latency_timer = now.latency_timer;

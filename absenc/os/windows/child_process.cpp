@@ -54,7 +54,7 @@ struct PipeEnds {
   Handle ours, other, nowhere;
 };
 
-/// What a process gets when it starts: its standard streams, which are all that it inherits.
+/// The settings with which a process starts. It inherits its standard streams and nothing else.
 class Startup {
  public:
   explicit Startup(const PipeEnds& ends) : inherited_{ends.other.get(), ends.nowhere.get()} {
