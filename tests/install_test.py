@@ -337,7 +337,7 @@ class Installed(Case):
         (folder / "absenc.toml").write_text('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n')
         for name in ("log.csv", "log.h5"):
             said = run_tool(program, folder / f"{program.name}-{name}", SOURCE / "examples/tformat.txt",
-                       env={**os.environ, "ABSENC_CONFIG": str(folder / "absenc.toml")})
+                            env={**os.environ, "ABSENC_CONFIG": str(folder / "absenc.toml")})
             self.assertRegex(said, r"^1 \S+")
         self.assertEqual((folder / f"{program.name}-log.h5").read_bytes()[:4], b"\x89HDF")
 
@@ -347,7 +347,7 @@ class Installed(Case):
         program = self.program("each_place", source, "absenc-client")
         self.assert_is_small(program)
         said = run_tool(program, "tformat:/dev/ttyNONE", "tformat:tcp:127.0.0.1:1", "ssi:spi:/dev/spidevNONE",
-                   "raa38-can:canNONE", "elbow", "raa38:/dev/null?baud=115200&trigger=gpio:X").splitlines()
+                        "raa38-can:canNONE", "elbow", "raa38:/dev/null?baud=115200&trigger=gpio:X").splitlines()
         for line, expected in zip(said, ("/dev/ttyNONE", "127.0.0.1 port 1", "/dev/spidevNONE", "can",
                                          "build it with absenc::configuration"), strict=False):
             self.assertIn(expected, line)
@@ -356,7 +356,7 @@ class Installed(Case):
     def program(self, name, source, *libraries):
         """Compiles a program, and links it with the flags that pkg-config prints for `libraries`."""
         run_tool("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", *libraries), "-o",
-            self.folder / name)
+                 self.folder / name)
         return self.folder / name
 
     def test_programs_build_with_pkg_config(self):
@@ -619,7 +619,7 @@ class Packages(unittest.TestCase):
             self.assertIn(package, self.field("python3-absenc", "Depends"))
         modules = self.python / "lib/python3/dist-packages"
         run_tool("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",
-            "import absenc; assert absenc.open('sim:tformat').read().valid")
+                 "import absenc; assert absenc.open('sim:tformat').read().valid")
 
     def test_unpacked_documents_are_complete(self):
         made = self.command / "share"

@@ -629,8 +629,8 @@ int main(int, char** arguments) try {
         self.file("CMakeLists.txt", self.PROJECT.format(version=version))
         self.file("outside.cpp", self.PROGRAM)
         run_tool("cmake", "-G", "Ninja", "-S", self.directory, "-B", self.file("build"),
-                      "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
-                      "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
+                 "-DCMAKE_TOOLCHAIN_FILE=" + os.path.join(root, "cmake/x86_64-w64-mingw32.cmake"),
+                 "-Dabsenc_DIR=" + self.file(f"{name}/lib/cmake/absenc"))
         run_tool("cmake", "--build", self.file("build"))
         com = self.at_com("--singleturn", "65536")
         port = re.search(r"COM\d+", com)[0]
