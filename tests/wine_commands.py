@@ -11,9 +11,6 @@ from wine_support import WINE, Prefix
 PORTS = "names a port, a device or a folder of Linux"
 FILES = "is about files that Windows does not have: pipes, devices, links"
 SIGNALS = "ends by a signal that Windows does not have, or looks at a terminal of Linux"
-SERVE = "needs serve"
-SCREEN = "needs the screen of monitor"
-ZIP = "needs zip archives"
 SPEED = "reads a shaft so fast that a pause of wine on a busy machine leaves a position unconfirmed"
 # For each module the tests that do not apply to absenc.exe, by their reasons.
 MODULES = {
@@ -21,8 +18,7 @@ MODULES = {
     "campaign": {},
     "change": {
         PORTS: ["Journal.test_empty_journal_is_reported", "Journal.test_every_kind_of_change_can_be_put_back",
-                "Journal.test_truncated_line_does_not_damage_next_one"],
-        SERVE: ["Journal.test_serve_records_changes"],
+                "Journal.test_serve_records_changes", "Journal.test_truncated_line_does_not_damage_next_one"],
     },
     "clocked": {
         PORTS: ["SpiAddress.test_device_in_absenc_toml", "SpiAddress.test_refuses_file_that_is_no_spi_device",
@@ -34,20 +30,17 @@ MODULES = {
                 "Names.test_every_verb_accepts_name", "Names.test_protocol_with_port_needs_no_file"],
         FILES: ["WrongFiles.test_refuses_dangling_link", "WrongFiles.test_refuses_endless_file",
                 "WrongFiles.test_refuses_fifo"],
-        SERVE: ["ManyEncoders.test_serve_with_many_encoders_ends_by_signal"],
+        SIGNALS: ["ManyEncoders.test_serve_with_many_encoders_ends_by_signal"],
     },
     "conform": {},
     "crc_find": {},
-    "decode_file": {ZIP: ["Levels.test_all_file_formats_agree"]},
+    "decode_file": {},
     "e201": {SIGNALS: ["ClockSweep.test_interrupt_restores_clock"]},
     "encolink_command": {},
     "hiperface": {},
     "info": {PORTS: ["Info.test_all_fields_as_text", "Info.test_json"]},
-    "joint": {SERVE: ["Serve.test_json"]},
-    "linear": {
-        SCREEN: ["Monitor.test_beside_rotary_encoder", "Monitor.test_screen"],
-        SPEED: ["Recording.test_csv", "Recording.test_json_lines"],
-    },
+    "joint": {},
+    "linear": {SPEED: ["Recording.test_csv", "Recording.test_json_lines"]},
     "memory": {
         PORTS: ["Files.test_dump_and_load"],
         FILES: ["Files.test_failed_dump_keeps_old_file", "Files.test_refuses_unwritable_output"],
