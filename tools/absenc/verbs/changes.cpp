@@ -76,7 +76,8 @@ const Subcommand changes_subcommand{
     "changes",
     "show what was changed in encoders, and how to put it back",
     "Each change that was sent, by this command, a program, Python or serve, with its result: confirmed, refused or\n"
-    "unknown. The journal is changes.tsv in $XDG_STATE_HOME/absenc, or else ~/.local/state/absenc.",
+    "unknown. The journal is changes.tsv in $XDG_STATE_HOME/absenc, or else ~/.local/state/absenc; on Windows in\n"
+    "%LOCALAPPDATA%\\absenc.",
     changes_parameters,
     changes_examples,
     run_changes};

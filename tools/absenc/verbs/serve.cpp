@@ -23,7 +23,7 @@ constexpr std::array<Parameter, 17> serve_parameters{{
      "where a proxy on this computer shows the page to others, as https://encoders.example: looking then needs a "
      "token"},
     {"--history", "FILE", "where the past is kept, in SQLite's format; none: nowhere",
-     "history.sqlite in $STATE_DIRECTORY or ~/.local/state/absenc"},
+     "history.sqlite in $STATE_DIRECTORY or ~/.local/state/absenc; on Windows in %LOCALAPPDATA%\\absenc"},
     {"--history-days", "DAYS", "what is older is deleted", "30"},
     {"--history-mb", "MB", "beyond it the oldest is deleted", "1024"},
     {"--mqtt", "BROKER",
@@ -53,8 +53,8 @@ const Subcommand serve_subcommand{
     "serve",
     "show encoders to many: a live page, HTTP with JSON, history, Prometheus",
     "Runs until it is ended. An encoder that is unplugged is waited for; a value that is not live is never shown as\n"
-    "one. Prints the address of the page. SIGHUP reads absenc.toml again: encoders that it describes as before are\n"
-    "not disturbed. What changes an encoder needs a token, always.",
+    "one. Prints the address of the page. On Linux, SIGHUP reads absenc.toml again: encoders that it describes as\n"
+    "before are not disturbed. What changes an encoder needs a token, always.",
     serve_parameters,
     serve_examples,
     nullptr,
