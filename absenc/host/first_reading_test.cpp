@@ -78,6 +78,21 @@ TEST(FirstReading, RefusesMuchFasterShaft) {
   }
 }
 
+// At 6000 rpm 819 counts of 13 bits are allowed in 1 ms. What lies before the first position is no step.
+TEST(FirstReading, NeedsAStepBeforeAFasterOne) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 1500, 0ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 3000, 1ms)));
+}
+
+// A shaft that kept to the limit until now does not move faster suddenly.
+TEST(FirstReading, RefusesFasterStepAfterAnAllowedOne) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 800, 1ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 800 + 900, 2ms)));
+}
+
 TEST(FirstReading, RefusesTwoDamagedPositions) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 100, 0ms)));

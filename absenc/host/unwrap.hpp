@@ -49,11 +49,12 @@ class Unwrapper {
 
   /// Returns whether `reading` is a jump from the last added reading; false if this cannot be known.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
-    if (!started_ || !has_position(reading) || !is_near(reading)) return false;
+    if (!started_ || !has_position(reading)) return false;
     constexpr Time vague{1'000'000};    // assumed uncertainty of the latch time: 1 ms
     constexpr std::uint64_t noise = 4;  // assumed noise of a position, in counts
     const Reach reach = reach_of(reading).at_excess(most_excess);
     const auto step = static_cast<std::uint64_t>(way(reading));
+    // After a long pause `way` is not sure, but `reach` is longer then than any way, so the reading is no jump.
     const std::uint64_t moved = way(reading) < 0 ? 0 - step : step;
     return moved > noise && moved - noise > reach.counts(apart(reading) + vague, reading.singleturn_bits);
   }

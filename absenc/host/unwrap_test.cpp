@@ -146,7 +146,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 TEST(Unwrapper, DetectsJumpOfShaft) {
   // The speed limit of 6000 rpm is a tenth of a turn per ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
-  EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
+  EXPECT_FALSE(unwrapper.jumps(multiturn(9, 500, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
   EXPECT_FALSE(unwrapper.jumps(multiturn(5, 823, 1ms))) << "too fast, but no jump";
   EXPECT_TRUE(unwrapper.jumps(multiturn(5, 824, 1ms)));

@@ -41,6 +41,13 @@ TEST(Velocity, IsTheMeanOverItsWindow) {
   EXPECT_LE(velocity.delay(), 7ms);
 }
 
+TEST(Velocity, WindowIsAtMostTwoMinutes) {
+  Velocity velocity(10min);
+  for (int i = 0; i <= 120; ++i) velocity.add(i * 100'000LL, i * 10s);
+  EXPECT_GE(velocity.delay(), 60s);
+  EXPECT_LE(velocity.delay(), 84s);
+}
+
 TEST(Velocity, SpansOneStepIfReadingsAreRare) {
   Velocity velocity(10ms);
   velocity.add(0, 0s);
