@@ -12,7 +12,6 @@ import shlex
 import signal
 import socket
 import sqlite3
-import struct
 import subprocess
 import sys
 import threading
@@ -20,19 +19,19 @@ import time
 import tty
 import unittest
 import zipfile
+from pathlib import Path
 
 import h5py
 
+from capture_support import FRAMES, conversation, write_each_format
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, character_units, end, json_lines
 from command_support import read_line, run_tool
-from decode_file_test import conversation
 from monitor_test import Terminal
 from mqtt_support import Broker, Receiver, free_port, numbers as numbers_of
 from serve_support import TOKEN, Server, Stream, of, wait_until
 from wine_support import WINE, Prefix
 
 EXE = os.path.abspath(os.environ.get("ABSENC_EXE", "build/windows/bin/absenc.exe"))
-FRAMES = "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n1A\n1A 00 45 23 01 11 34 12 00 00 4B\n"  # the last one is damaged
 prefix = Prefix()
 numbers = itertools.count(10)
 
@@ -649,34 +648,12 @@ int main(int, char** arguments) try {
 
 
 class Captures(WindowsCase):
-    def test_decodes_as_on_linux(self):
-        """Every format: bytes as text, VCD, CSV, sessions of sigrok, raw samples, Saleae's export as a file and as a
-        folder, a log of candump."""
-        wave = conversation(20, bad=(7,))
-        can = next(unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] == "can")
-        frames, vcd, csv, session, log = (self.file(f"Mitschnitt ä.{ending}")
-                                          for ending in ("txt", "vcd", "csv", "sr", "log"))
-        self.file(os.path.basename(frames), FRAMES)
-        self.file(os.path.basename(vcd), wave.vcd())
-        for file in (csv, session):
-            self.assert_good(absenc("wave", "sim:tformat?motion=rpm=60", file, "--count", "20"))
-        self.assert_good(absenc("read", f"sim:{can}?log={log}", "--count", "5"))
-        samples, saleae, folder = self.file("Werte ü.bin"), self.file("digital_0.bin"), self.file("Export ö")
-        os.mkdir(folder)
-        with open(samples, "wb") as file:
-            file.write(wave.samples("D0", 50))
-        changes = [(at * 1e-9, level) for at, level in wave.changes["D0"]]
-        export = b"<SALEAE>" + struct.pack("<iiIddQ", 0, 0, changes[0][1], 0, changes[-1][0] + 1e-4, len(changes) - 1)
-        export += struct.pack(f"<{len(changes) - 1}d", *(at for at, _ in changes[1:]))
-        for path in (saleae, os.path.join(folder, "digital_0.bin")):
-            with open(path, "wb") as file:
-                file.write(export)
-        for file, protocol, *more in ((frames, "tformat"), (vcd, "tformat"), (csv, "tformat"), (session, "tformat"), (log, can),
-                                      (samples, "tformat", "--raw-channels", "1", "--rate", "20000000"),
-                                      (saleae, "tformat"), (folder, "tformat")):
-            with self.subTest(file):
-                there = windows("decode", protocol, "Z:" + file, *more, "--json")
-                here = absenc("decode", protocol, file, *more, "--json")
+    def test_decodes_each_format_as_on_linux(self):
+        for file, arguments in write_each_format(Path(self.directory)):
+            protocol, *more = arguments
+            with self.subTest(file.name):
+                there = windows("decode", protocol, f"Z:{file}", *more, "--json")
+                here = absenc("decode", protocol, str(file), *more, "--json")
                 self.assertEqual(there.stdout, here.stdout, there.stderr)
                 self.assertEqual(there.returncode, here.returncode)
                 self.assertGreater(len([line for line in json_lines(here.stdout) if line.get("fields")]), 0, here.stderr)
