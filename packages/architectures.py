@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Machines for which absenc is built and tried, with their cross-compilers, headers, libraries and emulators."""
+import gzip
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TREES = ROOT / "build/release-trees"
+MIRROR = "http://deb.debian.org/debian"  # Debian's archive of point releases
 # The packages whose headers and libraries the cross-compilers need, and whose programs and libraries the emulators run.
 SYSROOT_PACKAGES = """libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libncurses-dev libfuse3-dev
     libftdi1-dev libgpiod-dev libhwy-dev libminizip-dev zlib1g-dev libdeflate-dev libhdf5-dev libmicrohttpd-dev libsqlite3-dev
@@ -37,12 +40,28 @@ class Architecture:
             say(f"Debian's headers and libraries for {self.name}")
             shutil.rmtree(root, ignore_errors=True)
             TREES.mkdir(parents=True, exist_ok=True)
-            run("mmdebstrap", "--variant=extract", f"--architectures={self.name}", f"--include={','.join(SYSROOT_PACKAGES)}",
-                "bookworm", root)
+            extract = ["mmdebstrap", "--variant=extract", f"--architectures={self.name}",
+                       f"--include={','.join(SYSROOT_PACKAGES)}", "bookworm", root]
+            failed = attempt(*extract)
+            if failed:  # a mirror may lack the lists of Debian's security updates for some architectures
+                reason = next((line for line in failed.splitlines() if line.startswith("E: ")), failed[-300:])
+                say(f"mmdebstrap failed: {reason}")
+                say(f"the packages for {self.name} are those of Debian's last point release, without later security updates")
+                shutil.rmtree(root, ignore_errors=True)
+                run(*extract, MIRROR)
             relative_links(root)
             shutil.rmtree(root / "dev")  # the emulators would open its devices in place of those of this computer
             made_of.write_text(wanted)
         return root
+
+    def version_of(self, package):
+        """Returns the version of the Debian package that programs for this architecture are built with."""
+        if self.native:
+            return installed_version(package)
+        folder = self.sysroot() / "usr/share/doc" / package
+        changes = folder / f"changelog.Debian.{self.name}.gz"  # of a package that was rebuilt for this architecture
+        with gzip.open(changes if changes.exists() else folder / "changelog.Debian.gz", "rt", encoding="utf-8") as text:
+            return re.search(r"\((.+?)\)", text.readline())[1]
 
     def emulated(self):
         """Returns the words that start a program of this architecture on this computer."""
@@ -73,13 +92,28 @@ PUBLISHED = {one.name: one for one in (
 BIG_ENDIAN = Architecture("s390x", "s390x-linux-gnu", "s390x", "qemu-s390x-static")
 
 
+def completed(command, settings):
+    return subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, check=False, **settings)
+
+
+def attempt(*command, **settings):
+    """Runs a command and returns its output if it fails, otherwise None."""
+    done = completed(command, settings)
+    return done.stdout if done.returncode != 0 else None
+
+
 def run(*command, **settings):
     """Runs a command and returns its output; ends this program with that output if it fails."""
-    done = subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, **settings)
+    done = completed(command, settings)
     if done.returncode != 0:
         sys.exit(f"{Path(sys.argv[0]).name}: {' '.join(map(str, command))} failed:\n{done.stdout[-6000:]}")
     return done.stdout
+
+
+def installed_version(package):
+    """Returns the version of a Debian package of this computer."""
+    return run("dpkg-query", "-W", "-f=${Version}", package)
 
 
 def say(text):

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from archives import write_tar, write_zip
-from architectures import PUBLISHED, ROOT, TREES, build_tree, run, say
+from architectures import PUBLISHED, ROOT, TREES, build_tree, installed_version, run, say
 
 VERSION = (ROOT / "VERSION").read_text().strip()
 sys.path.insert(0, str(ROOT / "packages/arduino"))
@@ -70,12 +70,15 @@ class Release:
     jobs: int
     commit: str
     epoch: int
-    inside: dict = field(default_factory=dict)  # for each artefact, the Debian packages whose code it contains
+    # for each artefact, the Debian packages whose code it contains, each with its version
+    inside: dict = field(default_factory=dict)
     sources_of: dict = field(default_factory=dict)  # for each source package in them, its version and its licence's file
 
-    def publish(self, path, packages=()):
+    def publish(self, path, packages=(), version_of=installed_version):
+        """Copies an artefact, which contains code of these Debian packages, to the output."""
         shutil.copyfile(path, self.output / path.name)
-        self.inside[path.name] = list(packages)
+        sources = {name: version for name, (version, _) in self.sources_of.items()}
+        self.inside[path.name] = [(name, sources.get(name) or version_of(name)) for name in packages]
 
     # --- building ---
 
@@ -92,7 +95,7 @@ class Release:
             for package in sorted(Path(scratch).glob("*.deb")):
                 inside = HEADERS + {"absenc-serve": ["libjs-dygraphs"], "python3-absenc": ["pybind11-dev"]}.get(
                     package.name.split("_")[0], [])
-                self.publish(package, [] if package.name.startswith("libabsenc-dev") else inside)
+                self.publish(package, [] if package.name.startswith("libabsenc-dev") else inside, architecture.version_of)
 
     def static_artefacts(self, architecture):
         say(f"the tarball and the wheel for {architecture.name}")
@@ -147,7 +150,7 @@ class Release:
             files[f"share/man/man7/{page.name}"] = (page.read_bytes(), 0o644)
         path = TREES / f"{name}.tar.gz"
         write_tar(path, {f"{name}/{file}": content for file, content in files.items()}, self.epoch)
-        self.publish(path, inside)
+        self.publish(path, inside, architecture.version_of)
 
     def wheel(self, architecture, tree):
         import absenc_build
@@ -160,7 +163,7 @@ class Release:
         licences = {f"licenses/{file}": content for file, (content, _) in self.licences(inside).items()}
         path = TREES / f"absenc-{VERSION}-{tag}.whl"
         absenc_build.write_wheel(path, package, tag, licences)
-        self.publish(path, inside)
+        self.publish(path, inside, architecture.version_of)
 
     def glibc_version(self, folder, architecture):
         """Returns the least N so that glibc 2.N can load the module."""
@@ -223,7 +226,7 @@ class Release:
 
     def lists(self):
         (self.output / "absenc.spdx.json").write_text(json.dumps(self.spdx(), indent=1, sort_keys=True) + "\n")
-        used = sorted({package for packages in self.inside.values() for package in packages})
+        used = sorted({name for packages in self.inside.values() for name, _ in packages})
         path = TREES / f"absenc-{VERSION}-licences.tar.gz"
         write_tar(path, self.licences(used), self.epoch)
         shutil.copyfile(path, self.output / path.name)
@@ -233,9 +236,9 @@ class Release:
     def spdx(self):
         """Returns the list of all artefacts and of the code of others in them, as SPDX 2.3."""
         packages, relationships = [], []
-        for name in sorted({package for inside in self.inside.values() for package in inside}):
-            version, _ = self.sources_of.get(name) or (run("dpkg-query", "-W", "-f=${Version}", name), None)
-            packages.append({"SPDXID": identifier(name), "name": name, "versionInfo": version, "supplier": "Organization: Debian",
+        for name, version in sorted({package for inside in self.inside.values() for package in inside}):
+            packages.append({"SPDXID": identifier(f"{name}-{version}"), "name": name, "versionInfo": version,
+                             "supplier": "Organization: Debian",
                              "licenseConcluded": LICENCES[name], "licenseDeclared": LICENCES[name],
                              "copyrightText": "NOASSERTION", "downloadLocation": f"https://packages.debian.org/bookworm/{name}"})
         for artefact, inside in sorted(self.inside.items()):
@@ -247,7 +250,7 @@ class Release:
             relationships.append({"spdxElementId": "SPDXRef-DOCUMENT", "relationshipType": "DESCRIBES",
                                   "relatedSpdxElement": identifier(artefact)})
             relationships += [{"spdxElementId": identifier(artefact), "relationshipType": "CONTAINS",
-                               "relatedSpdxElement": identifier(one)} for one in inside]
+                               "relatedSpdxElement": identifier(f"{name}-{version}")} for name, version in inside]
         created = subprocess.run(["date", "-u", "-d", f"@{self.epoch}", "+%Y-%m-%dT%H:%M:%SZ"], check=True,
                                  capture_output=True, text=True).stdout.strip()
         return {"spdxVersion": "SPDX-2.3", "SPDXID": "SPDXRef-DOCUMENT", "dataLicense": "CC0-1.0", "name": f"absenc {VERSION}",
