@@ -7,7 +7,7 @@ import subprocess
 import sys
 import unittest
 
-from root_support import ISOLATED, SOURCE, VERSION, RootCase, WholeInstallation, artefact
+from root_support import ISOLATED, PACKAGES, SOURCE, VERSION, RootCase, WholeInstallation, artefact, dependencies
 
 sys.path.insert(0, str(SOURCE / "packages"))
 from architectures import BIG_ENDIAN, PUBLISHED, build_tree
@@ -83,6 +83,11 @@ class Emulated:
         subprocess.run(["tar", "-xzf", artefact(f"{name}.tar.gz"), "-C", self.root / "srv"], check=True)
         self.write_program("from-tarball", f'exec {self.architecture.emulator} /srv/{name}/bin/absenc "$@"')
         self.try_the_command("from-tarball")
+
+    def test_packages_need_the_same_as_on_amd64(self):
+        for package in PACKAGES:
+            with self.subTest(package):
+                self.assertEqual(dependencies(package, self.architecture.name), dependencies(package))
 
     def test_units_and_command(self):
         tree = built(self.architecture, "-DABSENC_PYTHON=ON")

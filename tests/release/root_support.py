@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -12,6 +13,11 @@ SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().paren
 VERSION = (SOURCE / "VERSION").read_text().strip()
 RELEASE = Path(os.environ.get("ABSENC_RELEASE", SOURCE / f"build/release-{VERSION}"))
 ROOTS = SOURCE / "build/release-roots"
+sys.path.insert(0, str(SOURCE / "tests"))
+from capture_support import write_each_format
+from command_support import absenc
+
+PACKAGES = ("absenc", "absenc-serve", "absenc-hdf5", "libabsenc-dev", "python3-absenc")
 # Command that runs a program with another root folder (chroot): the program has no network but its own loopback, and
 # none of its processes outlives the test.
 ISOLATED = ["unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "sh", "-ec",
@@ -38,6 +44,19 @@ def base(name, suite, packages):
                        capture_output=True, timeout=600)
         made_of.write_text(wanted)
     return path
+
+
+def dependencies(package, architecture="amd64"):
+    """Returns the names of the packages that this package of absenc needs."""
+    fields = subprocess.run(["dpkg-deb", "-f", artefact(f"{package}_*_{architecture}.deb"), "Depends"], check=True,
+                            capture_output=True, text=True).stdout
+    return set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", fields.strip()))
+
+
+def debian_12():
+    """Returns the archive of a root with all that the packages of absenc need, and the tools with which they are tried."""
+    tools = {"iproute2", "curl", "ca-certificates", "systemd", "python3-h5py"}
+    return base("bookworm-with-dependencies", "bookworm", sorted(tools.union(*map(dependencies, PACKAGES)) - set(PACKAGES)))
 
 
 class RootCase(unittest.TestCase):
@@ -75,25 +94,39 @@ class RootCase(unittest.TestCase):
     def shell(self, script, **settings):
         return self.run_inside("sh", "-euc", script, **settings)
 
-    def try_the_command(self, absenc):
+    def try_the_command(self, command):
         """Tries what each installation of the command can do."""
         self.put(SOURCE / "examples/tformat.txt")
-        self.assertRegex(self.run_inside(absenc, "--version"), rf"^absenc {re.escape(VERSION)}\n")
-        self.assertIn("tformat", self.run_inside(absenc, "list"))
-        self.assertIn("turns", self.run_inside(absenc, "read", "sim:tformat"))
+        self.assertRegex(self.run_inside(command, "--version"), rf"^absenc {re.escape(VERSION)}\n")
+        self.assertIn("tformat", self.run_inside(command, "list"))
+        self.assertIn("turns", self.run_inside(command, "read", "sim:tformat"))
         # one reply in the capture tformat.txt is damaged on purpose
-        self.assertIn("bad_checksum", self.run_inside(absenc, "decode", "tformat", "/srv/tformat.txt", "--csv", status=1))
-        self.assertIn("tformat", self.run_inside(absenc, "identify", "/srv/tformat.txt"))
-        self.assertIn("good", self.run_inside(absenc, "doctor", "sim:tformat", "--readings", "100"))
-        self.run_inside(absenc, "record", "sim:tformat", "--output", "/srv/log.csv", "--count", "3")
+        self.assertIn("bad_checksum", self.run_inside(command, "decode", "tformat", "/srv/tformat.txt", "--csv", status=1))
+        self.assertIn("tformat", self.run_inside(command, "identify", "/srv/tformat.txt"))
+        self.try_each_format(command)
+        self.assertIn("good", self.run_inside(command, "doctor", "sim:tformat", "--readings", "100"))
+        self.run_inside(command, "record", "sim:tformat", "--output", "/srv/log.csv", "--count", "3")
         self.assertTrue((self.root / "srv/log.csv").read_text().startswith("# absenc record 1\n"))
         (self.root / "srv/log.csv").unlink()
         said = self.shell(f"""
-            {absenc} emulate tformat --tcp 0 --for 20 >/tmp/emulator 2>&1 & emulator=$!
+            {command} emulate tformat --tcp 0 --for 20 >/tmp/emulator 2>&1 & emulator=$!
             while ! grep -q '^ready: tcp' /tmp/emulator; do kill -0 $emulator; done
-            {absenc} read "tformat:$(sed -n 's/^ready: //p' /tmp/emulator | grep tcp)" --count 2
+            {command} read "tformat:$(sed -n 's/^ready: //p' /tmp/emulator | grep tcp)" --count 2
             kill $emulator""")
         self.assertEqual(said.count("no alarms"), 2, said)
+
+    def try_each_format(self, command):
+        """Decodes captures in each format, as the command of this computer does."""
+        folder = self.root / "srv/captures"
+        folder.mkdir()
+        for path, (protocol, *options) in write_each_format(folder):
+            with self.subTest(path.name):
+                here = absenc("decode", protocol, str(path), *options, "--json")
+                inside = self.run_inside(command, "decode", protocol, str(path).removeprefix(str(self.root)), *options, "--json",
+                                         status=here.returncode)
+                self.assertEqual(inside, (here.stdout + here.stderr).replace(str(self.root), ""))
+                self.assertIn('"singleturn"', inside)
+        shutil.rmtree(folder)
 
 
 class WholeInstallation:
@@ -102,7 +135,7 @@ class WholeInstallation:
     def test_command(self):
         self.try_the_command("absenc")
 
-    def test_each_format_of_captures(self):
+    def test_waveforms(self):
         for ending in ("sr", "vcd", "csv"):
             with self.subTest(ending):
                 name = f"/srv/wave.{ending}"
