@@ -18,3 +18,5 @@ set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
 set(ENV{PKG_CONFIG_SYSROOT_DIR} "${ABSENC_CROSS_ROOT}")
 set(ENV{PKG_CONFIG_LIBDIR}
     "${ABSENC_CROSS_ROOT}/usr/lib/${ABSENC_CROSS_TUPLE}/pkgconfig:${ABSENC_CROSS_ROOT}/usr/share/pkgconfig")
+# pybind11 asks the Python of this computer for it, and drops a value that is given as an option.
+set(PYTHON_MODULE_EXTENSION ".cpython-311-${ABSENC_CROSS_TUPLE}.so")

@@ -76,8 +76,8 @@ class Architecture:
         return [f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/cross.cmake", f"-DABSENC_CROSS_TUPLE={self.tuple}",
                 f"-DABSENC_CROSS_PROCESSOR={self.processor}", f"-DABSENC_CROSS_ROOT={root}",
                 f"-DABSENC_CROSS_EMULATOR={self.emulator}",
+                f"-DCMAKE_INSTALL_LIBDIR=lib/{self.tuple}",  # as CMake itself chooses it for a Debian package of this computer
                 f"-DPython3_INCLUDE_DIR={root}/usr/include/python3.11",
-                f"-DPYTHON_MODULE_EXTENSION=.cpython-311-{self.tuple}.so",
                 "-DHDF5_C_COMPILER_EXECUTABLE=false",
                 f"-DHDF5_C_LIBRARY_hdf5={root}/usr/lib/{self.tuple}/libhdf5_serial.so",
                 f"-DHDF5_C_INCLUDE_DIR={root}/usr/include/hdf5/serial"]
