@@ -18,7 +18,7 @@ class BugReport(unittest.TestCase):
         self.path = Path(scratch.name) / "bug.zip"
 
     def report(self, encoder, *options):
-        done = absenc("doctor", encoder, "--readings", "60", "--report", str(self.path), *options)
+        done = absenc("doctor", encoder, "--readings", "60", "--report", str(self.path), "--force", *options)
         self.assertTrue(self.path.is_file(), done.stderr)
         with zipfile.ZipFile(self.path) as archive:
             return done, {name: archive.read(name).decode() for name in archive.namelist()}
@@ -74,13 +74,50 @@ class BugReport(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("is damaged", done.stderr)
 
-    def test_name_of_an_adapter_is_masked(self):
-        """The names in /dev/serial/by-id contain the serial number of the adapter."""
-        place = "/dev/serial/by-id/usb-FTDI_A50285BI-if00-port0"
-        for options, is_shown in (((), False), (("--serial-numbers",), True)):
-            _, files = self.report(f"tformat:{place}", *options)
-            for name, text in files.items():
-                self.assertEqual("A50285BI" in text, is_shown and name != "exchanges.txt", name)
+    def test_serial_number_of_an_adapter_is_masked(self):
+        for encoder in ("tformat:/dev/serial/by-id/usb-FTDI_A50285BI-if00-port0", "biss:ftdi:A50285BI/B"):
+            for options, is_shown in (((), False), (("--serial-numbers",), True)):
+                with self.subTest(encoder, options=options):
+                    _, files = self.report(encoder, *options)
+                    for name, text in files.items():
+                        self.assertEqual("A50285BI" in text, is_shown and name != "exchanges.txt", name)
+
+    def test_holds_the_settings_as_they_were_given(self):
+        _, files = self.report("sim:tformat?fault=corrupt=0.2&seed=1&max_rpm=3000")
+        self.assertIn("given as: sim:tformat?fault=corrupt=0.2&seed=1&max_rpm=3000\n", files["report.txt"])
+        for setting in ("fault=corrupt=0.2", "seed=1", "max_rpm=3000"):
+            self.assertIn(f"\n  {setting}\n", files["report.txt"])
+
+    def test_settings_of_a_named_encoder(self):
+        folder = self.path.parent
+        (folder / "absenc.toml").write_text('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\nmax_rpm = 3000\n')
+        absenc("doctor", "elbow", "--readings", "60", "--report", str(self.path), cwd=folder).check_returncode()
+        with zipfile.ZipFile(self.path) as archive:
+            summary = archive.read("report.txt").decode()
+        self.assertIn("encoder: sim:tformat\ngiven as: elbow\n", summary)
+        self.assertIn("\n  max_rpm=3000\n", summary)
+
+    def test_replaces_an_existing_file_only_with_force(self):
+        self.path.write_text("a recording")
+        done = absenc("doctor", "sim:tformat", "--readings", "60", "--report", str(self.path))
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("exists: give another name, or --force to replace it", done.stderr)
+        self.assertEqual(self.path.read_text(), "a recording")
+
+    def test_requests_on_a_line_that_turns_are_shown(self):
+        """EnDat: the first requests read the resolution, the others a position."""
+        self.report("sim:endat")
+        shown = absenc("decode", str(self.path))
+        self.assertEqual(shown.returncode, 0)
+        self.assertNotIn("bad_checksum", shown.stdout)
+        self.assertIn("  00111000  ", shown.stdout)
+
+    def test_is_no_table_for_programs(self):
+        self.report("sim:tformat")
+        for option in ("--json", "--csv", "--stats", "--bits"):
+            done = absenc("decode", str(self.path), option)
+            self.assertEqual(done.returncode, 2, option)
+            self.assertIn("is a report", done.stderr)
 
     def test_a_file_that_cannot_be_written_is_an_error(self):
         done = subprocess.run([ABSENC, "doctor", "sim:tformat", "--readings", "20", "--report", "/nowhere/bug.zip"],

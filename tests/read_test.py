@@ -183,7 +183,7 @@ class ErrorMessages(EncoderCase):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")
         self.assert_failed(result, "absenc: timeout: the encoder did not answer", "sent 1A to ", "at 2500000 baud",
                            "Try: check supply")
-        self.assertRegex(result.stderr, r"nothing came back within 100 us \+ \d+ ms for the way\n")
+        self.assertRegex(result.stderr, r"nothing came back within 100 us, plus \d+ ms for the adapter or network\n")
         self.assertEqual(result.stdout, "")
 
     def test_silence_as_json(self):

@@ -41,6 +41,7 @@ def commands(block):
 def masked(text):
     """Returns the lines of the text with each number replaced by N, because numbers vary."""
     text = re.sub(r" \(\d+ failed(; this computer itself was up to [^)]*)?\)", "", text)
+    text = re.sub(r", and this computer itself was up to [^;]*", "", text)
     return [re.sub(r"\s+", " ", re.sub(r"\d+(\.\d+)?", "N", line)).strip() for line in text.splitlines() if line.strip()]
 
 

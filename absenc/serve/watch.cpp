@@ -226,8 +226,10 @@ void Watch::read_on(const std::stop_token& stop) {
 }
 
 void Watch::set_state(State state, const std::string& message) {
+  bool had_reading = false;
   const bool is_new = [&] {
     const std::lock_guard lock(mutex_);
+    had_reading = current_.has_reading;
     const bool changed = current_.state != state || (state == State::ended && current_.message != message);
     current_.state = state;
     current_.message = message;
@@ -239,7 +241,7 @@ void Watch::set_state(State state, const std::string& message) {
     next_failure_report_ = os::now() + failure_report_interval;
   }
   if (state != State::live) return add_event(name_of(state), message);
-  add_event("back", "readings arrive again");
+  add_event("back", had_reading ? "readings arrive again" : "readings arrive");
 }
 
 void Watch::publish(const Encoder& live, const Sample& sample) {

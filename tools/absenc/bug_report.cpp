@@ -71,12 +71,19 @@ std::string adapter_text(const EncoderAddress& address, ReportedExchanges::Seria
   return text;
 }
 
-// Masks the path of a port that contains the serial number of an adapter, as "/dev/serial/by-id/usb-FTDI_A5-if00".
-void mask_adapter(std::string& text, const std::string& path) {
+// Returns the part of the address that contains the serial number of an adapter: the name in /dev/serial/by-id, or the
+// serial number of an FTDI chip; empty if there is none.
+std::string_view adapter_name(const EncoderAddress& address) {
   constexpr std::string_view folder = "/dev/serial/by-id/";
-  if (!path.starts_with(folder)) return;
-  for (std::size_t at = text.find(path); at != std::string::npos; at = text.find(path, at)) {
-    text.replace(at, path.size(), std::string(folder) + std::string(masked_frame));
+  const std::string_view path = address.path;
+  if (address.port_kind == PortKind::ftdi) return path.substr(0, path.find('/'));
+  return path.starts_with(folder) ? path.substr(folder.size()) : std::string_view();
+}
+
+void mask(std::string& text, std::string_view secret) {
+  if (secret.empty()) return;
+  for (std::size_t at = text.find(secret); at != std::string::npos; at = text.find(secret, at + masked_frame.size())) {
+    text.replace(at, secret.size(), masked_frame);
   }
 }
 
@@ -112,10 +119,12 @@ std::string ReportedExchanges::text() const {
 BugReport make_report(const EncoderAddress& address, const Examination& examination, const ReportedExchanges& exchanges,
                       ReportedExchanges::SerialNumbers serial_numbers) {
   const Unit& unit = *address.unit;
-  std::string summary = fmt::format("{}\n\n{}\n\nencoder: {}\n", report_title, version_text(), address_of(address));
+  std::string summary = fmt::format("{}\n\n{}\n\nencoder: {}\ngiven as: {}\n", report_title, version_text(),
+                                    address_of(address), address.written);
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     summary += fmt::format("  {} = {}\n", unit.options[i].name, to_text(unit.options[i], address.options[i]));
   }
+  for (const std::string& setting : address.link_settings) summary += fmt::format("  {}\n", setting);
   summary += adapter_text(address, serial_numbers) + '\n';
   for (const Finding& one : examination.findings)
     summary += fmt::format("{}: {}\n", name_of(one.severity), one.sentence());
@@ -128,7 +137,7 @@ BugReport make_report(const EncoderAddress& address, const Examination& examinat
   }
   BugReport report{summary + '\n', to_json(examination).line() + '\n', lines + exchanges.text()};
   if (serial_numbers == ReportedExchanges::SerialNumbers::masked) {
-    for (std::string* text : {&report.summary, &report.doctor}) mask_adapter(*text, address.path);
+    for (std::string* text : {&report.summary, &report.doctor}) mask(*text, adapter_name(address));
   }
   return report;
 }

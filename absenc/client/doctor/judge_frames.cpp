@@ -417,11 +417,18 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
   };
-  if (const All refused = take(is_misheard); !refused.empty()) {
-    findings.push_back(finding(FindingKind::requests_damaged,
-                               {fmt::format("{}", refused.size()), fmt::format("{}", one.seen.readings.size()),
-                                refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
-                                                               : refused.back()->detail}));
+  // A checksum misses some damaged replies, which may then look like replies to other requests.
+  constexpr std::size_t damaged_for_each_missed = 20;
+  const All misheard = take(is_misheard);
+  const bool is_any_refused = std::ranges::any_of(misheard, [](const Attempted* each) { return is_refusal(*each); });
+  if (!is_any_refused && misheard.size() * damaged_for_each_missed <= all.size()) {
+    all.insert(all.end(), misheard.begin(), misheard.end());
+  } else if (!misheard.empty()) {
+    findings.push_back(
+        finding(FindingKind::requests_damaged,
+                {fmt::format("{}", misheard.size()), fmt::format("{}", one.seen.readings.size()),
+                 misheard.back()->detail.empty() ? std::string(text_of(misheard.back()->error).description)
+                                                 : misheard.back()->detail}));
   }
   // A reply that contradicts its request, an earlier reply or itself is reported only if no reply has other damage: the
   // contradiction may come from damage that the checksum missed.

@@ -31,8 +31,8 @@ constexpr auto table = std::to_array<Words>({
     {FindingKind::port_missing, "port_missing", fault, "{0}",
      "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `absenc ports` lists the adapters"},
-    {FindingKind::port_forbidden, "port_forbidden", fault, "{0}", "the user is not in the group that owns the port",
-     "join the group of the port, as in `sudo usermod -aG dialout $USER`, and log in again"},
+    {FindingKind::port_forbidden, "port_forbidden", fault, "{0}", "this user may not use the port",
+     "get access to the port as the error says, or start absenc as a user who has it"},
     {FindingKind::port_in_use, "port_in_use", fault, "{0}",
      "another program has it open, and both would take each other's bytes", "{1}"},
     {FindingKind::port_unsuitable, "port_unsuitable", fault, "{0}", "the encoder cannot be connected to such a port",
@@ -396,6 +396,9 @@ std::string Examination::verdict() const {
   if (measured.slowest > Time{}) {
     const auto ms = [](Time time) { return std::chrono::duration<double, std::milli>(time).count(); };
     evidence += fmt::format("; replies took {:.3f} to {:.3f} ms", ms(measured.quickest), ms(measured.slowest));
+    if (good == tried && measured.computer_late >= std::chrono::milliseconds(1)) {
+      evidence += fmt::format(", and this computer itself was up to {} late", to_text(measured.computer_late));
+    }
   }
   if (!measured.echo.empty()) evidence += fmt::format("; {}", measured.echo);
   if (measured.latency) evidence += fmt::format("; latency of the port up to {}", to_text(*measured.latency));

@@ -344,7 +344,7 @@ class ConnectionOn final : public Connection {
     const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
     if (line_.received.empty()) {
       const std::string latency =
-          link_->link().latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->link().latency)) : "";
+          link_->link().latency > Time{} ? fmt::format(", plus {} for the adapter or network", to_text(link_->link().latency)) : "";
       return fmt::format("{}; nothing came back within {}{}", sent, to_text(line_.answer), latency);
     }
     const Time after = line_.marks.front().at - line_.sent_at;

@@ -86,6 +86,10 @@ class DumpParser {
                       "`absenc memory dump` makes one of any encoder",
                       name_));
     }
+    if (title != dump_title && title.starts_with("absenc dump ")) {
+      throw Failure(fmt::format("{} begins with \"{}\", but this absenc reads \"{}\": use a newer absenc", name_, title,
+                                dump_title));
+    }
     if (title != dump_title) {
       throw Failure(fmt::format("{} is no dump (its first line is not \"{}\")", name_, dump_title));
     }

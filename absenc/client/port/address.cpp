@@ -156,7 +156,10 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   }
   uri.options = require_options(*uri.unit, {}, options, names);
   uri.line = line_settings(*uri.unit, uri.options);
-  for (const OptionText& setting : of_link) set_link_parameter(uri, setting);
+  for (const OptionText& setting : of_link) {
+    set_link_parameter(uri, setting);
+    uri.link_settings.push_back(fmt::format("{}={}", setting.name, setting.value));
+  }
   check_speed_limit(uri);
   check_joint(of_link, uri.unit->resolution(uri.options).unit_um > 0);
   const bool any_rate_does =

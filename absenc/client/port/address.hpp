@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/client/joint.hpp"
 #include "absenc/client/port/virtual_device.hpp"
@@ -118,6 +119,8 @@ struct EncoderAddress {
   const Command* reads = nullptr;  // command for repeated readings; null: the first command with Verb::read
   DeviceSettings device;
   std::string written;  // address as the user wrote it, with the settings given beside it: "elbow?baud=57600"
+  // settings of port and line that were given, also in absenc.toml, as "baud=57600"
+  std::vector<std::string> link_settings;
 };
 
 /// Returns the speed limit that the user set or, if none was set, that of host::speed_limit.

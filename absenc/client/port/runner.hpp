@@ -61,6 +61,7 @@ template <class Item>
     if (!reply.empty()) exchange.reply.can = reply.back();
   } else {
     exchange.request.bytes.assign(request.begin(), request.end());
+    exchange.request.bits = clocks != 0 ? request.size() * 8 : 0;
     exchange.reply.bytes.assign(reply.begin(), reply.end());
     exchange.reply.bits = std::min(clocks, reply.size() * 8);
   }

@@ -105,7 +105,7 @@ std::string SerialPort::rate_instead(std::uint32_t requested, std::uint32_t give
   const bool known = ::ioctl(descriptor(), TIOCGSERIAL, &serial) == 0 && serial.baud_base >= 0;
   const std::uint32_t clock = known ? static_cast<std::uint32_t>(serial.baud_base) : 0;
   return "its nearest rate is " + std::to_string(nearest_rate(requested, given, clock)) +
-         ": use that, or another adapter";
+         ": use another adapter, or that rate if the encoder can have it";
 }
 
 void SerialPort::set_direction(Rs485 rs485) {

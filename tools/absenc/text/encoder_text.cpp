@@ -60,7 +60,9 @@ Json to_json(const Trouble& trouble) {
 }
 
 std::string finding_line(const Trouble& trouble, const EncoderAddress& address) {
-  return fmt::format("Looks like {}; `absenc doctor {}` says more", trouble.finding, address_of(address));
+  // the shell would take ? and & for its own
+  const std::string_view quote = address.written.find('?') != std::string::npos ? "\"" : "";
+  return fmt::format("Looks like {}; `absenc doctor {}{}{}` says more", trouble.finding, quote, address.written, quote);
 }
 
 Json errors_to_json(const host::Counters& counters) {
@@ -74,7 +76,9 @@ Json errors_to_json(const host::Counters& counters) {
 std::string exchanges_text(const host::Counters& counters, std::uint64_t readings) {
   const std::string text = summary(counters);
   if (counters.good <= readings) return text;
-  return fmt::format("{}; {} of the good ones confirmed a position, or were commands", text, counters.good - readings);
+  return fmt::format(
+      "{}; {} of the good exchanges gave no reading of their own: they confirmed a position or ran a command", text,
+      counters.good - readings);
 }
 
 void set_motion(Json& json, const Sample& sample, double unit_um) {

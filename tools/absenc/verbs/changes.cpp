@@ -52,7 +52,8 @@ int run_changes(const Invocation& invocation) {
   if (rows.size() == 1) {
     print_line(path.empty() ? "no journal is kept: ABSENC_CHANGES is \"none\", or there is no home folder; "
                               "ABSENC_CHANGES=FILE names one"
-                            : fmt::format("no changes are in {}", path));
+               : invocation.has("encoder") ? fmt::format("no changes of {} are in {}", invocation.text("encoder"), path)
+                                           : fmt::format("no changes are in {}", path));
     return exit_good;
   }
   print_line(table(rows));
@@ -63,7 +64,7 @@ int run_changes(const Invocation& invocation) {
 
 constexpr std::array<Parameter, 2> changes_parameters{{
     {"encoder", "", "only those of this one, as it was written then, with its settings or without"},
-    parameter::json,
+    {"--json", "", "one JSON object a line"},
 }};
 constexpr std::array<Example, 2> changes_examples{{
     {"absenc changes", "what was changed, when, and the commands that put it back"},

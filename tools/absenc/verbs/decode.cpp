@@ -169,10 +169,21 @@ int run_decode(const Invocation& invocation) {
   std::error_code error;
   if (!invocation.has("file") && std::filesystem::is_regular_file(os::path_of(first), error) &&
       is_report(std::string(first))) {
+    for (const std::string_view option : {"--json", "--csv", "--stats", "--bits"}) {
+      if (invocation.has(option)) {
+        throw UsageError(
+            fmt::format("{} is about a capture, but {} is a report: doctor.json in this zip archive is for programs",
+                        option, first));
+      }
+    }
     return show_report(std::string(first));
   }
   if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(os::path_of(first), error)) {
     return identify_instead(first);
+  }
+  if (find_unit(first) == nullptr && first.find_first_of("./\\") != std::string_view::npos) {
+    throw Failure(fmt::format(
+        "{} does not exist: name the file of a capture, or of a report of `absenc doctor --report`", first));
   }
   const Unit& unit = require_unit(first);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));

@@ -3,11 +3,13 @@
 
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <optional>
 #include <string>
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/identify/line.hpp"
+#include "absenc/os/file_name.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/bug_report.hpp"
 #include "tools/absenc/error.hpp"
@@ -62,6 +64,10 @@ int run_doctor(const Invocation& invocation) {
     const std::chrono::duration<double> time(invocation.real(name, fallback, least, 3600));
     return std::chrono::duration_cast<Time>(time);
   };
+  const std::string report_path(invocation.text("--report"));
+  if (invocation.has("--report") && !invocation.has("--force") && std::filesystem::exists(os::path_of(report_path))) {
+    throw UsageError(fmt::format("{} exists: give another name, or --force to replace it", report_path));
+  }
   DoctorChoices choices;
   choices.readings = static_cast<std::size_t>(invocation.number("--readings", 100'000, 10, 1'000'000));
   choices.limit = seconds("--for", 3, 0.1);
@@ -82,16 +88,15 @@ int run_doctor(const Invocation& invocation) {
   }
   if (invocation.has("--report")) {
     const BugReport report = make_report(address, examination, exchanges, serial_numbers);
-    const std::string path(invocation.text("--report"));
     print_note(
         fmt::format("The report holds this, and in exchanges.txt the exchanges themselves:\n\n{}", report.summary));
-    write_report(path, report);
-    print_message(fmt::format("{} is written; `absenc decode {}` shows all of it", path, path));
+    write_report(report_path, report);
+    print_message(fmt::format("{} is written; `absenc decode {}` shows all of it", report_path, report_path));
   }
   return examination.healthy() ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 8> doctor_parameters{{
+constexpr std::array<Parameter, 9> doctor_parameters{{
     parameter::encoder,
     {"--for", "SECONDS", "how long it reads, as fast as it can", "3"},
     {"--readings", "N", "it ends after so many readings", "100000"},
@@ -100,6 +105,7 @@ constexpr std::array<Parameter, 8> doctor_parameters{{
     {"--report", "FILE.zip",
      "also write a report for those who correct absenc: versions, adapter, settings, findings, the last thousand "
      "exchanges; what it holds is shown first"},
+    {"--force", "", "replace the file of --report if it exists"},
     {"--serial-numbers", "", "do not mask serial numbers in the report"},
     parameter::json,
     parameter::option,
