@@ -7,6 +7,7 @@ archives for Windows, the sources, packages for firmware, licences, an SPDX list
 The same commit gives the same bits: nothing in an artefact depends on folder, user or time.
 """
 import argparse
+import contextlib
 import hashlib
 import io
 import json
@@ -126,7 +127,12 @@ class Release:
         import libraries
         import pack
         say("absenc.exe")
-        folders = libraries.folders()
+        log = TREES / "windows-libraries.log"
+        try:
+            with log.open("w", encoding="utf-8") as lines, contextlib.redirect_stderr(lines):
+                folders = libraries.folders()
+        except subprocess.CalledProcessError as failed:
+            sys.exit(f"release: {failed}\n{log.read_text(encoding='utf-8')[-6000:]}")
         tree = ROOT / "build/tree-windows"
         run("cmake", "--preset", "windows", "-S", ROOT, "-B", tree, "-D", "ABSENC_TESTS=OFF",
             env={**os.environ, "ABSENC_WINDOWS_LIBRARIES": ";".join(folders)})

@@ -288,6 +288,8 @@ struct Unit {
   std::string_view document;  ///< title of the protocol's document
   /// Other names by which users find the unit, such as "Tamagawa" or "Smart-Abs".
   std::span<const std::string_view> known_as{};
+  /// Other devices whose replies look the same, so that a reply cannot prove the encoder; empty: none is known.
+  std::string_view lookalikes{};
   LinkKind link;      ///< Kind of link between host and encoder.
   LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must state it.
   std::span<const Option> options;    ///< Options that the user may set in an address.

@@ -26,7 +26,8 @@ CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.
 
 def run(*command, folder, **settings):
     print("+", *command, file=sys.stderr, flush=True)
-    subprocess.run(command, cwd=folder, check=True, stdin=subprocess.DEVNULL, stdout=sys.stderr, **settings)
+    subprocess.run(command, cwd=folder, check=True, stdin=subprocess.DEVNULL, stdout=sys.stderr, stderr=sys.stderr,
+                   **settings)
 
 
 def make(*words, folder):

@@ -290,8 +290,8 @@ class ConnectionOn final : public Connection {
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;
-    trouble.message += fmt::format(
-        ": replies came up to {} after their requests, later than its limit, and were dropped", to_text(lateness));
+    trouble.message += fmt::format(": replies that came after its limit, at most {} after their requests, were dropped",
+                                   to_text(lateness));
     if (uri().port_kind == PortKind::sim) return;
     trouble.advice = fmt::format(
         "allow the way so long with latency={} (milliseconds) behind the encoder, or find what "
@@ -343,8 +343,9 @@ class ConnectionOn final : public Connection {
     }
     const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
     if (line_.received.empty()) {
-      const std::string latency =
-          link_->link().latency > Time{} ? fmt::format(", plus {} for the adapter or network", to_text(link_->link().latency)) : "";
+      const std::string latency = link_->link().latency > Time{} ? fmt::format(", plus {} for the adapter or network",
+                                                                               to_text(link_->link().latency))
+                                                                 : "";
       return fmt::format("{}; nothing came back within {}{}", sent, to_text(line_.answer), latency);
     }
     const Time after = line_.marks.front().at - line_.sent_at;

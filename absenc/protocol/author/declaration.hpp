@@ -34,6 +34,7 @@ struct Declaration {
   std::string_view document{};  ///< title of the protocol's document
   /// Names of makers and families by which users find the unit: "Tamagawa", "Smart-Abs".
   std::span<const std::string_view> known_as{};
+  std::string_view lookalikes{};      ///< Unit::lookalikes
   LinkKind link{};                    ///< Kind of link between host and encoder.
   std::span<const Option> options{};  ///< options of the unit: OptionsOf::infos (option.hpp)
   /// Returns the format with these option values, for example `format_of`.

@@ -385,6 +385,7 @@ struct Descriptor {
               .name = declared.name,
               .document = declared.document,
               .known_as = declared.known_as,
+              .lookalikes = declared.lookalikes,
               .link = declared.link,
               .line = line_of(Format{}),
               .options = declared.options,

@@ -42,6 +42,7 @@ Json to_json(const Candidate& candidate, const std::string& command) {
   json.set("encoder", candidate.encoder.empty() ? Json() : Json(candidate.encoder));
   json.set("identity", to_json(candidate.identity.row()));
   json.set("line", candidate.line).set("unasked", candidate.unsolicited);
+  json.set("lookalikes", candidate.unit->lookalikes.empty() ? Json() : Json(candidate.unit->lookalikes));
   json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
   json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
   return json.set("more_bits_possible", candidate.hypothesis.at_least).set("command", command);
@@ -115,6 +116,11 @@ std::vector<std::string> advice(std::span<const Candidate> candidates) {
     std::vector<std::string> names;
     for (const Candidate* one : found) names.push_back(one->encoder);
     notes.push_back(fmt::format("note: {} encoders are on the line: {}", found.size(), fmt::join(names, ", ")));
+  }
+  if (!best.unit->lookalikes.empty()) {
+    notes.push_back(
+        fmt::format("note: {} answers like this: to know that it is {}, compare the position while the shaft turns",
+                    best.unit->lookalikes, best.unit->name));
   }
   if (notes.empty() && best.hypothesis.at_least) {
     return {"note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once"};

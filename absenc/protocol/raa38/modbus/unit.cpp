@@ -273,6 +273,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .id = "raa38-modbus",
     .name = "RAA38S6 over Modbus RTU",
     .document = "Absolute Encoder Operation Manual, RAA38S6 series",
+    .lookalikes = "any Modbus device that has the same registers",
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = author::format_of<options>,
