@@ -192,7 +192,7 @@ class Tester {
       // If the last reply was late, the replies to the requests before it are assumed to be late, not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
-      if (was_answered(one) && one.is_late()) readings.late += unanswered + 1;
+      if (was_answered(one) && one.is_late()) readings.late += requests;
       if (one.in_doubt && was_answered(one) && !one.is_late()) {
         ++readings.in_doubt;
         readings.good_in_doubt += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
