@@ -4,7 +4,7 @@ import csv
 import io
 import unittest
 
-from command_support import Case, absenc, json_lines
+from command_support import Case, Emulator, absenc, json_lines
 
 BACKWARDS = "sim:amt21?model=AMT21xD&multiturn=-3"
 
@@ -50,6 +50,15 @@ class Scan(Case):
         for address in ("sim:amt21", "sim:amt21?rate=9600&address=0x10"):
             (found,) = json_lines(absenc("scan", address, "--json").stdout)[0]["encoders"]
             self.assertEqual(found["encoder_address"], 0x10 if "0x10" in address else 0x54)
+
+    def test_scan_finds_eight_consecutive_addresses(self):
+        addresses = range(0, 32, 4)
+        also = [word for address in addresses[1:] for word in ("--also", f"address={address}")]
+        with Emulator(self.directory, "--option", "address=0", *also, protocol="amt21") as line:
+            result = absenc("scan", f"amt21:{line.path}?latency=100", "--json")
+            self.assert_good(result)
+            found = json_lines(result.stdout)[0]["encoders"]
+            self.assertEqual([one["encoder_address"] for one in found], list(addresses))
 
     def test_reserved_request_is_unexpected(self):
         refused = absenc("decode", "amt21", "--request", "57")

@@ -19,12 +19,24 @@ class ChangeStates(Case):
         return text, answer
 
     def test_success_is_confirmed(self):
-        for verb in (["zero", "sim:tformat"], ["config", "set", "sim:tformat", "overheat-threshold", "80"],
+        for verb in (["zero", "sim:tformat?singleturn=1000"], ["config", "set", "sim:tformat", "overheat-threshold", "80"],
                      ["run", "sim:tformat", "memory-write", "5", "0x42"], ["memory", "write", "sim:tformat", "5", "0x42"]):
             with self.subTest(verb):
                 text, answer = self.both(*verb)
                 self.assert_good(text)
                 self.assertEqual(answer["change"], "confirmed")
+
+    def test_zero_that_may_have_been_ignored_is_unknown(self):
+        """0.35 degrees are 127 counts of 17 bits."""
+        for place, state in (("0", "unknown"), ("120", "unknown"), ("131000", "unknown"), ("128", "confirmed")):
+            with self.subTest(place):
+                text, answer = self.both("zero", f"sim:tformat?singleturn={place}")
+                self.assertEqual((text.returncode, answer["change"]), (0, state))
+                if state == "unknown":
+                    self.assertIn("turn the shaft and try again", answer["change_note"])
+                    self.assertIn("note: sent, result unknown; the position was already there before", text.stderr)
+                else:
+                    self.assertNotIn("change_note", answer)
 
     def test_unchanged_value_is_not_sent(self):
         _, answer = self.both("memory", "write", "sim:tformat", "5", "0")
@@ -93,7 +105,7 @@ class Journal(Case):
         self.assertEqual(self.changes(), [])
 
     def test_every_kind_of_change_can_be_put_back(self):
-        with Emulator(self.directory) as encoder:
+        with Emulator(self.directory, "--singleturn", "1000") as encoder:
             address = f"tformat:{encoder.path}?latency=300"
             self.assert_good(self.absenc("config", "set", address, "overheat-threshold", "80", "--yes"))
             self.assert_good(self.absenc("memory", "write", address, "5", "0x42", "--page", "2", "--yes"))
@@ -155,11 +167,11 @@ class Journal(Case):
             for journal in ("/dev/full", self.file("no")):
                 if journal != "/dev/full":
                     os.mkdir(journal)  # the journal's path is that of a folder, so that the journal cannot be written
-                result = self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", ABSENC_CHANGES=journal)
+                result = self.absenc("clear-alarms", f"tformat:{encoder.path}?latency=300", "--yes", ABSENC_CHANGES=journal)
                 self.assertEqual(result.returncode, 0)
                 self.assertIn("singleturn", result.stdout)
                 self.assertIn(f"note: the change is not in the journal {journal}: ", result.stderr)
-                json_result = json.loads(self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", "--json",
+                json_result = json.loads(self.absenc("clear-alarms", f"tformat:{encoder.path}?latency=300", "--yes", "--json",
                                               ABSENC_CHANGES=journal).stdout)
                 self.assertEqual((json_result["ok"], json_result["change"]), (True, "confirmed"))
                 self.assertIn("is not in the journal", json_result["change_note"])

@@ -107,8 +107,10 @@ class Interface(InterfaceCase):
             self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))
             self.assertEqual(counts(emulator.path), 0)
             self.assertEqual(self.run_json(emulator.path, "read")["singleturn"], 1000)
-            self.assert_good(absenc("run", f"e201:{emulator.path}", "clear-zero", "--yes"))
-            self.assertEqual(counts(emulator.path), 1000)
+            for state in ("confirmed", "unknown"):  # there is no zero any more when it is cleared again
+                cleared = self.run_json(emulator.path, "run", "clear-zero", "--yes")
+                self.assertEqual((cleared["fields"]["counts"], cleared["change"]), (1000, state))
+            self.assertIn("no zero was set, or", cleared["change_note"])
         with self.emulator("--motion", "rpm=60") as emulator:
             self.assert_failed(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"), "not_still", "standing still")
 

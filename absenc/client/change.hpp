@@ -18,7 +18,8 @@ enum class ChangeState : std::uint8_t {
   not_sent,   ///< no request was sent, so the encoder is unchanged
   confirmed,  ///< the request was sent; the reply and, where there is one, the read-back confirm the change
   refused,    ///< the request was sent, but the encoder refused it or its read-back shows no change
-  unknown,    ///< the request was sent, but no good reply or read-back came: the change may be done or not
+  /// the request was sent, but no good reply or read-back came, or the read-back would be the same without the change
+  unknown,
 };
 
 /// Returns the state as a word: "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
@@ -29,7 +30,8 @@ struct Change {
   ChangeState state = ChangeState::none;  ///< Whether the encoder was changed, as far as it is known.
   /// Advice for the user; "": none.
   std::string advice{};
-  std::string note{};  ///< Reason why the journal has no entry of this change; "": the journal has it, or needs none.
+  /// What the change did besides, why its result is unknown, or why the journal has no entry of it; "": nothing.
+  std::string note{};
 
   /// Returns state, advice and note as text, "sent, result unknown: ADVICE; NOTE"; "" for `none`.
   [[nodiscard]] std::string text() const;

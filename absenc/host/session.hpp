@@ -134,9 +134,14 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
-  /// Returns whether the last conversation sent a request that changes the encoder, and whether it was refused.
+  /// Returns whether the last conversation sent a request that changes the encoder, and what is known of its result.
   [[nodiscard]] ChangeSent change_sent() const {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
+  }
+
+  /// Returns the note of the last conversation about its change; see Conversation::change_note.
+  [[nodiscard]] std::string_view change_note() const {
+    return current_ != nullptr ? current_->change_note() : std::string_view{};
   }
 
   /// Makes the session use `guard`, which must outlive it. All sessions on one line share one guard.

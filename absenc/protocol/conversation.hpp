@@ -38,8 +38,9 @@ struct StreamCounts {
 /// Whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
-  yes,      ///< a request that changes the encoder was sent, or possibly sent
-  refused,  ///< such a request (see `yes`) was sent, but the encoder refused it, or reading back shows no change
+  yes,       ///< a request that changes the encoder was sent, or possibly sent
+  refused,   ///< such a request (see `yes`) was sent, but the encoder refused it, or reading back shows no change
+  unproven,  ///< such a request was sent; what is read back would be the same if the encoder had ignored it
 };
 
 /// Host side of one command. Its result, at the step `emit` or `done`, is valid until the next call of `feed` or
@@ -71,6 +72,8 @@ struct Conversation : Machine<Item> {
   virtual bool abort() { return false; }
   /// Returns whether a request that changes the encoder was sent; valid at every step.
   [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
+  /// Returns a text for people on what the change did besides, or why its result is unknown; empty: there is nothing.
+  [[nodiscard]] virtual std::string_view change_note() const { return {}; }
   /// Puts fields into `sink` for the changes of the encoder that remain if the conversation ends now; by default none.
   virtual void report_left(FieldSink&) const {}
 

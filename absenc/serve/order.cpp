@@ -24,7 +24,8 @@ constexpr std::size_t most_bytes = 4096;  // greatest number of memory addresses
 using Between = std::function<void()>;
 
 OrderResult success(const Command& command, const Answer& answer, const std::string& note, ChangeState change) {
-  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row()),
+  const std::string done = change == ChangeState::unknown ? Change{change}.text() : "done";
+  return {true, fmt::format("{}: {}{}{}", command.name, done, note.empty() ? "" : "; ", note), to_json(answer.row()),
           change};
 }
 

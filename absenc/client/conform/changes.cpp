@@ -24,7 +24,7 @@ namespace {
 // wait that is longer than an encoder is busy after the write of a byte, including the time of its reply
 constexpr Time settling = std::chrono::milliseconds(50);
 constexpr unsigned tries = 3;  // number of times that the test tries to restore a changed value of the encoder
-// number of bytes of the memory, directly before the written byte, that must stay unchanged
+// number of bytes of the memory on each side of the written byte that must stay unchanged
 constexpr std::uint32_t beside = 4;
 // two positions count as equal if they differ by at most this fraction of a turn, 1/512
 constexpr unsigned position_tolerance = 512;
@@ -39,6 +39,25 @@ std::int64_t number_of(const Answer& answer, std::string_view field) {
   if (const auto* number = std::get_if<std::int64_t>(&value)) return *number;
   if (const auto* counts = std::get_if<std::uint64_t>(&value)) return static_cast<std::int64_t>(*counts);
   throw ClauseBroken{fmt::format("{} was not told", field)};
+}
+
+// Returns the addresses next to that of the clause, on both sides, that are in the same area of the memory.
+std::vector<std::uint32_t> addresses_beside(const Unit& unit, const Clause& clause) {
+  std::vector<std::uint32_t> addresses;
+  const auto area =
+      std::ranges::find_if(unit.memory, [&](const MemoryArea& one) { return one.has(clause.page, clause.address); });
+  if (area == unit.memory.end()) return addresses;
+  const std::uint32_t first = clause.address - std::min(beside, clause.address - area->first);
+  const std::uint32_t end = std::min(clause.address + beside + 1, area->first + area->count);
+  for (std::uint32_t at = first; at < end; ++at) {
+    if (at != clause.address) addresses.push_back(at);
+  }
+  return addresses;
+}
+
+// Adds to the evidence how exactly it compares positions.
+std::string with_tolerance(std::string_view seen) {
+  return fmt::format("{}; positions are compared to within 1/{} turn", seen, position_tolerance);
 }
 
 struct BusySink final : FieldSink {
@@ -122,10 +141,15 @@ void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
 void ChangeTester::test_bytes_beside(const Clause& clause, ClauseResult& result) {
   if (!clause.setting.empty()) save_setting(clause);
   const std::size_t settings = saved_.size();
+  MemoryImage compared;
   if (clause.demand == Demand::page_alone) {
     save_byte(static_cast<std::uint32_t>(clause.other), clause.address);
+    compared[{static_cast<std::uint32_t>(clause.other), clause.address}] = 0;
   } else {
-    for (std::uint32_t at = clause.address - beside; at < clause.address; ++at) save_byte(clause.page, at);
+    for (const std::uint32_t at : addresses_beside(unit_, clause)) {
+      save_byte(clause.page, at);
+      compared[{clause.page, at}] = 0;
+    }
   }
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   saved_.back().write(written);
@@ -133,8 +157,9 @@ void ChangeTester::test_bytes_beside(const Clause& clause, ClauseResult& result)
   const auto same =
       std::count_if(others.begin(), others.end(), [](const Saved& other) { return other.look() == other.value; });
   const std::int64_t now = saved_.back().look();
-  std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
-                                 others.size(), written, now);
+  std::string seen = fmt::format(
+      "{} of {} others ({}) are as before, when 0x{:02X} was written to {} and 0x{:02X} is read", same, others.size(),
+      addresses_in_words(unit_, compared), written, to_text(unit_, {clause.page, clause.address}), now);
   if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
   // Unchanged neighbouring bytes prove nothing if the byte itself was not written.
   result.evidence = seen;
@@ -194,7 +219,8 @@ void ChangeTester::test_offset(const Clause& clause, ClauseResult& result) {
   const Command& zero = *find_command(unit_, Verb::zero);
   static_cast<void>(run(zero, complete_arguments(zero, std::array{clause.value})));
   const Reading after = read();
-  const std::string seen = fmt::format("the position is {} after {}", after.singleturn, before.singleturn);
+  const std::string seen =
+      with_tolerance(fmt::format("the position is {} after {}", after.singleturn, before.singleturn));
   if (!is_near(after, 0)) return conclude(result, false, seen);
   result.evidence = seen + ": it was 0 before";
   if (!is_near(before, 0)) conclude(result, true, seen);
@@ -235,9 +261,9 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   set(clause.other);
   const std::int64_t second = is_mirrored();
   const auto words = [](std::int64_t mirrored) { return mirrored != 0 ? "mirrored" : "as before"; };
-  conclude(
-      result, first != second,
-      fmt::format("with {} the position is {}, with {} {}", clause.value, words(first), clause.other, words(second)));
+  conclude(result, first != second,
+           with_tolerance(fmt::format("with {} the position is {}, with {} {}", clause.value, words(first),
+                                      clause.other, words(second))));
 }
 
 void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
@@ -279,7 +305,8 @@ void ChangeTester::test_zero(ClauseResult& result) {
   if (!may_erase(before.singleturn != 0 ? fmt::format("a position of {}", before.singleturn) : "", result)) return;
   static_cast<void>(run(zero, complete_arguments(zero, {})));
   const Reading after = read();
-  const std::string seen = fmt::format("the position is {} after {}", after.singleturn, before.singleturn);
+  const std::string seen =
+      with_tolerance(fmt::format("the position is {} after {}", after.singleturn, before.singleturn));
   if (!is_near(after, 0)) return conclude(result, false, seen);
   result.evidence = seen + ": it was 0 before, a command that is ignored would not show";
   if (differs) conclude(result, true, seen);
@@ -302,6 +329,7 @@ void ChangeTester::test_reset(const Clause& clause, ClauseResult& result) {
   const bool obeyed = ran.error == Error::none || (ran.error == Error::cross_check_failed && after.alarms != 0);
   const bool cleared = (after.alarms & demanded) == 0 && (!turns || after.multiturn == 0);
   const bool nothing_else = is_near(after, before.singleturn) && (turns || after.multiturn == before.multiturn);
+  seen = with_tolerance(seen);
   if (!obeyed) seen = fmt::format("{} {}; {}", text_of(ran.error).name, ran.detail, seen);
   if (!obeyed || !cleared || !nothing_else) return conclude(result, false, std::move(seen));
   const bool differs = turns ? before.multiturn != 0 : (before.alarms & demanded) != 0;
@@ -319,8 +347,8 @@ void ChangeTester::test_restart(const Clause& clause, ClauseResult& result) {
   const Reading after = read();
   const bool silent = !at_once.heard;
   conclude(result, silent && is_near(after, before.singleturn),
-           fmt::format("at once: {}; later position {}, {} before", silent ? "no answer" : "an answer",
-                       after.singleturn, before.singleturn));
+           with_tolerance(fmt::format("at once: {}; later position {}, {} before", silent ? "no answer" : "an answer",
+                                      after.singleturn, before.singleturn)));
 }
 
 // ---- Saving and restoring values

@@ -73,7 +73,8 @@ class Disobedient final : public Machine<Item> {
   unsigned ignored_until = 0;  // number of the first request that the encoder does not ignore any more
   // number of the request whose reply gets a wrong bit; 0: no reply does
   unsigned damaged_at = 0;
-  unsigned change = 0;  // number, from 1, of the memory change that `spoil` corrupts; 0: no change is corrupted
+  unsigned change = 0;      // number, from 1, of the memory change that `spoil` corrupts; 0: no change is corrupted
+  bool spoils_all = false;  // whether `spoil` corrupts each change of the memory
   // corrupts the memory, given its new content and its previous content
   std::function<void(MutableBytes, const ByteList&)> spoil{};
   unsigned requests = 0;
@@ -81,7 +82,8 @@ class Disobedient final : public Machine<Item> {
  private:
   [[nodiscard]] ByteList memory() const { return {device_.memory().begin(), device_.memory().end()}; }
   void look(const ByteList& before) {
-    if (std::equal(before.begin(), before.end(), device_.memory().begin()) || ++changes_ != change) return;
+    if (std::equal(before.begin(), before.end(), device_.memory().begin())) return;
+    if (++changes_ != change && !spoils_all) return;
     spoil(device_.memory(), before);
   }
 
@@ -407,6 +409,101 @@ TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
         << at << ": " << words;
   }
   EXPECT_GT(changed, 4U);
+}
+
+// Result of a zero: its error, and what the session knows of the change.
+struct Zeroed {
+  Error error;
+  ChangeSent change;
+  std::string note;
+};
+
+// Sets the zero of an encoder at the position `counts`. `is_ignored`: the encoder replies, but stores nothing.
+template <class Item>
+Zeroed zero_at(const Unit& unit, std::uint64_t counts, bool is_ignored) {
+  const Bench<Item> bench(parse_address(fmt::format("sim:{}?singleturn={}", unit.id, counts)));
+  const Command& zero = *find_command(unit, Verb::zero);
+  if (is_ignored) {
+    bench.mutant->spoils_all = true;
+    bench.mutant->spoil = [](MutableBytes now, const ByteList& before) {
+      std::copy(before.begin(), before.end(), now.begin());
+    };
+  }
+  std::vector<std::byte> storage(unit.host_storage);
+  host::Session<Item> session(unit, bench.address.options, *bench.line, storage);
+  const Conversation<Item>* const ended = session.run(zero, complete_arguments(zero, {}));
+  return {ended->error(), session.change_sent(), std::string(session.change_note())};
+}
+
+// An encoder that ignores the zero, and stands so near to it that the position read back is right nevertheless.
+TEST(Zero, IsNotConfirmedIfItCouldHaveBeenIgnored) {
+  unsigned unproven = 0;
+  for (const Unit* const unit : all_units()) {
+    if (find_command(*unit, Verb::zero) == nullptr) continue;
+    const EncoderAddress address = parse_address(fmt::format("sim:{}", unit->id));
+    const std::uint64_t turn = std::uint64_t{1} << unit->resolution(address.options).singleturn_bits;
+    const auto at = [&](std::uint64_t counts, bool is_ignored) {
+      return unit->link == LinkKind::can ? zero_at<CanFrame>(*unit, counts, is_ignored)
+                                         : zero_at<std::uint8_t>(*unit, counts, is_ignored);
+    };
+    if (at(turn / 3, false).error == Error::unsupported) continue;
+    const Zeroed obeyed = at(turn / 3, false);
+    EXPECT_EQ(obeyed.error, Error::none) << unit->id;
+    EXPECT_EQ(obeyed.change, ChangeSent::yes) << unit->id;
+    EXPECT_EQ(obeyed.note, "") << unit->id;
+    const Zeroed ignored = at(turn / 3, true);
+    if (ignored.error == Error::none) continue;  // this virtual encoder has its zero not only in its memory
+    EXPECT_EQ(ignored.change, ChangeSent::refused) << unit->id;
+    const Zeroed near = at(std::max<std::uint64_t>(turn >> 15, 1), true);
+    EXPECT_TRUE(near.error != Error::none || near.change != ChangeSent::yes) << unit->id;
+    if (near.change == ChangeSent::unproven) {
+      ++unproven;
+      EXPECT_NE(near.note.find("turn the shaft and try again"), std::string::npos) << unit->id << ": " << near.note;
+    }
+  }
+  EXPECT_GE(unproven, 5U);
+}
+
+// Each byte beside the written one is compared, before and behind it, as far as its area of the memory reaches.
+TEST(Conformance, ByteBesideIsComparedOnBothSides) {
+  struct Case {
+    const char* text;
+    const char* clause;
+    const char* compared;
+    int to;  // distance of the last byte behind it that is compared
+  };
+  for (const Case& one : {Case{"sim:hiperface?model=SKM36", "data-beside", "page 0: 0x7A to 0x7D, 0x7F", 1},
+                          Case{"sim:tformat", "eeprom-beside", "page 0: 0x7A to 0x7D", 0}}) {
+    const EncoderAddress address = parse_address(one.text);
+    const Conformance good = Bench<std::uint8_t>(address).run();
+    EXPECT_EQ(verdict_of(good, one.clause), Verdict::kept) << good.report();
+    EXPECT_NE(good.report().find(fmt::format("({})", one.compared)), std::string::npos) << good.report();
+    for (int by = -4; by <= one.to; ++by) {
+      if (by == 0) continue;
+      bool broken = false;
+      for (unsigned change = 1; change <= 12 && !broken; ++change) {
+        const Bench<std::uint8_t> bench(address);
+        bench.mutant->change = change;
+        bench.mutant->spoil = [by](MutableBytes now, const ByteList& before) {
+          const auto written = std::mismatch(before.begin(), before.end(), now.begin()).second;
+          *(written + by) ^= 0x55;
+        };
+        broken = verdict_of(bench.run(), one.clause) == Verdict::broken;
+      }
+      EXPECT_TRUE(broken) << one.text << " " << by;
+    }
+  }
+}
+
+TEST(Conformance, EvidenceSaysHowPositionsAreCompared) {
+  const Bench<std::uint8_t> bench(parse_address("sim:tformat?singleturn=50000&multiturn=7"));
+  const Conformance found = bench.run(true);
+  for (const char* const id : {"zero", "reset-multiturn"}) {
+    const auto clause = std::ranges::find(found.clauses, id, &ClauseResult::id);
+    EXPECT_EQ(clause->verdict, Verdict::kept) << found.report();
+    EXPECT_NE(clause->evidence.find("positions are compared to within 1/512 turn"), std::string::npos)
+        << clause->evidence;
+  }
 }
 
 TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {

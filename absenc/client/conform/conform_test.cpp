@@ -165,6 +165,67 @@ TEST(Conformance, LateReplyOnSlowLineIsReceived) {
   EXPECT_EQ(verdict_of(found, "answer"), Verdict::kept) << found.report();
 }
 
+// Returns the results for an encoder of HIPERFACE each of whose replies is `delay` late.
+Conformance conform_delayed(Time delay) {
+  const ReplyChange<std::uint8_t> late{.change = [delay](Mutant<std::uint8_t>& mutant) {
+    mutant.always = true;
+    mutant.mutated = 1;
+    mutant.change_reply = [delay](std::vector<std::uint8_t>&, ByteStep& step) { step.at += delay; };
+  }};
+  return conform_mutant<std::uint8_t>(parse_address("sim:hiperface?model=SKM36"), late, {.readings = 10}, 5ms);
+}
+
+std::string evidence_of(const Conformance& conformance, std::string_view id) {
+  return std::ranges::find(conformance.clauses, id, &ClauseResult::id)->evidence;
+}
+
+// A host repeats the request, and the late reply to the first one arrives soon after the second.
+TEST(Conformance, LateReplyIsNotCreditedToLaterRequest) {
+  for (const Time delay : {70ms, 120ms, 300ms}) {
+    const Conformance found = conform_delayed(delay);
+    EXPECT_EQ(verdict_of(found, "answer-time"), Verdict::broken) << found.report();
+    EXPECT_NE(evidence_of(found, "answer-time").find("good replies, the latest after "), std::string::npos)
+        << found.report();
+    EXPECT_EQ(verdict_of(found, "answer"), Verdict::untested) << found.report();
+    EXPECT_NE(evidence_of(found, "answer").find(" 0 of them well, "), std::string::npos) << found.report();
+    EXPECT_EQ(verdict_of(found, "check"), Verdict::untested) << found.report();
+  }
+  // These replies come later than the test listens: each of them arrives after another request than its own.
+  for (const Time delay : {520ms, 560ms, 590ms, 1100ms}) {
+    const Conformance found = conform_delayed(delay);
+    EXPECT_NE(verdict_of(found, "answer-time"), Verdict::kept) << delay / 1ms << "\n" << found.report();
+    EXPECT_NE(verdict_of(found, "answer"), Verdict::kept) << delay / 1ms << "\n" << found.report();
+    EXPECT_NE(evidence_of(found, "answer").find(" 0 of them well"), std::string::npos) << found.report();
+  }
+}
+
+// The connection may have added 150 ms to the time of each reply; a host waits 55 ms.
+TEST(Conformance, TimeIsUntestedWithinUncertaintyOfPort) {
+  const EncoderAddress address = parse_address("sim:hiperface?model=SKM36");
+  const auto judge = [&](Time after, Time sent_late) {
+    const Attempted one{
+        .answered = true, .answered_after = after, .limit = 205ms, .latency = 150ms, .sent_late = sent_late};
+    ClauseResult result{.verdict = Verdict::untested};
+    judge_time(*address.unit, address.options, {.all = {one}, .requests = 1, .answered = 1, .good = 1}, result);
+    return result;
+  };
+  EXPECT_EQ(judge(206ms, {}).verdict, Verdict::broken);
+  EXPECT_EQ(judge(206ms, 60ms).verdict, Verdict::broken);
+  for (const Time after : {56ms, 120ms, 205ms}) {
+    const ClauseResult untested = judge(after, {});
+    EXPECT_EQ(untested.verdict, Verdict::untested) << after / 1ms;
+    EXPECT_NE(untested.evidence.find("the limit lies within this uncertainty"), std::string::npos) << untested.evidence;
+  }
+  EXPECT_EQ(judge(55ms, {}).verdict, Verdict::kept);
+  // The request may have ended up to 60 ms before its end was reported.
+  EXPECT_EQ(judge(1ms, 60ms).verdict, Verdict::untested);
+  const ClauseResult negative = judge(-2687us, {});
+  EXPECT_EQ(negative.verdict, Verdict::kept);
+  EXPECT_EQ(negative.evidence.find("1 good replies, the latest after less than the port's uncertainty of 150000.0 us"),
+            0U)
+      << negative.evidence;
+}
+
 // A port that cannot change its rate, such as a TCP bridge or a pseudo-terminal.
 class FixedRatePort final : public Port<std::uint8_t> {
  public:

@@ -131,9 +131,11 @@ Machine<Item>& machine_of(const VirtualDevice& device) {
 }
 
 template <class Item>
-Conformance conform_mutant(EncoderAddress address, const ReplyChange<Item>& change, const ConformChoices& choices) {
+Conformance conform_mutant(EncoderAddress address, const ReplyChange<Item>& change, const ConformChoices& choices,
+                           Time latency = {}) {
   if (!change.condition.empty()) address.device.conditions.push_back(change.condition);
   Link link;
+  link.latency = latency;
   link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
   link.device->power_on(Time{});
   Mutant<Item> mutant(machine_of<Item>(*link.device), address.unit->link);

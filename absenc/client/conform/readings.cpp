@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <set>
+#include <utility>
 
 #include "absenc/client/conform/evidence.hpp"
 #include "absenc/client/error.hpp"
@@ -45,6 +46,12 @@ std::size_t detected_mixtures(const Unit& unit, const Options& options, const Re
   return noticed;
 }
 
+// Returns how many replies are no evidence of the reply to their own request; "" if there are none.
+std::string doubt_text(const Readings& readings) {
+  if (readings.in_doubt == 0) return {};
+  return fmt::format("; {} replies came after a request without reply, and may be its late reply", readings.in_doubt);
+}
+
 }  // namespace
 
 bool is_flat(const capture::ObservedFrame& reply) {
@@ -66,11 +73,14 @@ const Attempted* Readings::first_good() const {
 void judge_answered(const Readings& readings, ClauseResult& result) {
   result.evidence = "with these options nothing is asked";
   if (readings.requests == 0) return;
+  const std::uint64_t good = readings.good - readings.good_in_doubt;
   std::string seen =
-      fmt::format("{} of {} requests answered, {} of them well", readings.answered, readings.requests, readings.good);
+      fmt::format("{} of {} requests answered, {} of them well", readings.answered, readings.requests, good);
+  if (readings.late != 0) seen += fmt::format(", {} late", readings.late);
+  seen += doubt_text(readings);
   if (readings.answered != readings.requests) return conclude(result, false, std::move(seen));
   result.evidence = seen + ": what else came may be anything";
-  if (readings.good != 0) conclude(result, true, std::move(seen));
+  if (good != 0) conclude(result, true, std::move(seen));
 }
 
 void judge_streamed(const Readings& readings, ClauseResult& result) {
@@ -85,26 +95,39 @@ void judge_streamed(const Readings& readings, ClauseResult& result) {
   conclude(result, comes, std::move(seen));
 }
 
-void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency,
-                ClauseResult& result) {
+void judge_time(const Unit& unit, const Options& options, const Readings& readings, ClauseResult& result) {
+  // the reply that is certainly late, or else the one that may be, whose time exceeds its limit most
   const Attempted* worst = nullptr;
   std::size_t timed = 0;
+  const auto latest = [](const Attempted& one) { return one.answered_after + one.sent_late; };
+  const auto excess = [&](const Attempted& one) {
+    return std::pair(one.is_late(), (one.is_late() ? one.answered_after : latest(one)) - one.limit);
+  };
   for (const Attempted& one : readings.all) {
-    if (!was_answered(one) || one.limit == Time{}) continue;
+    if (!was_answered(one) || one.limit == Time{} || (one.in_doubt && !one.is_late())) continue;
     const bool is_good = one.error == Error::none ||
                          unit.check(options, one.exchange.request.frame(), one.exchange.reply.frame()) == Error::none;
     if (!is_good) continue;
     ++timed;
-    const auto excess = [](const Attempted& reply) { return reply.answered_after - reply.limit; };
     if (worst == nullptr || excess(one) > excess(*worst)) worst = &one;
   }
-  result.evidence = "no good reply to a request came";
+  result.evidence = "no good reply to a request came" + doubt_text(readings);
   if (worst == nullptr) return;
   const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
-  std::string seen = fmt::format("{} good replies, the latest after {:.1f} us, of {:.1f} us that a host waits", timed,
-                                 us(worst->answered_after), us(worst->limit));
-  if (latency > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency));
-  conclude(result, worst->answered_after <= worst->limit, std::move(seen));
+  const Time uncertainty = worst->latency + worst->sent_late;
+  const Time waits = worst->limit - worst->latency;
+  const std::string after =
+      worst->answered_after >= Time{}
+          ? fmt::format("after {}{:.1f} us", worst->in_doubt ? "at least " : "", us(worst->answered_after))
+          : fmt::format("after less than the port's uncertainty of {:.1f} us", us(uncertainty));
+  std::string seen =
+      fmt::format("{} good replies, the latest {}, of {:.1f} us that a host waits", timed, after, us(waits));
+  if (uncertainty > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(uncertainty));
+  seen += doubt_text(readings);
+  // The connection only adds to a reply's time, so a reply that is measured within the host's time is in time.
+  result.evidence = seen + ": the limit lies within this uncertainty, so the reply may be late or not";
+  if (worst->is_late()) return conclude(result, false, std::move(seen));
+  if (latest(*worst) <= waits) conclude(result, true, std::move(seen));
 }
 
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,

@@ -72,7 +72,7 @@ class Tester {
       case Demand::streamed:
         return judge_streamed(readings_, result);
       case Demand::in_time:
-        return judge_time(unit_, options_, readings_, latency_, result);
+        return judge_time(unit_, options_, readings_, result);
       case Demand::whole:
         return test_frames(clause, any_of(Error::wrong_length, Error::truncated), result);
       case Demand::checked:
@@ -98,6 +98,10 @@ class Tester {
   // The test listens for a reply for 20 ms plus the duration of 16 characters.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
+  // After a request that the encoder must answer, the test listens this long for a late reply, so that it does not take
+  // that reply for the one to its next request.
+  static constexpr Time late_listening = std::chrono::milliseconds(500);
+  static constexpr unsigned most_late_listenings = 8;  // bounds the time that a silent encoder costs
   static constexpr unsigned times = 3;  // number of times that each test sends its command or request to the encoder
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
@@ -147,6 +151,22 @@ class Tester {
     runner_.keep_exchange(one);
     return one;
   }
+  // Reads the encoder by requests that it must answer, and waits for late replies.
+  Attempted once_answered(const Options& options) {
+    Attempted one = once(options);
+    if (one.error == Error::none || !is_polled() || is_streamed(options)) return one;
+    Time listen_for = 2 * lateness_;
+    if (!one.answered && late_listenings_ < most_late_listenings) {
+      ++late_listenings_;
+      listen_for = std::max(listen_for, late_listening);
+    }
+    if (!one.answered && listen_for > listening_) {
+      runner_.listen(listen_for - listening_);
+      runner_.keep_exchange(one);
+    }
+    if (one.is_late()) lateness_ = std::max(lateness_, one.answered_after);
+    return one;
+  }
   // Runs a reading once. NextRequest ends the reading after its first exchange.
   Attempted read_once() {
     try {
@@ -160,15 +180,23 @@ class Tester {
   }
   [[nodiscard]] Readings read_all(const Options& options) {
     Readings readings;
+    bool is_outstanding = false;  // whether the late reply to an earlier request may still come
     const auto attempt = [&] {
       const std::uint64_t before = runner_.port().requests;
-      const Attempted one = once(options);
+      Attempted one = once_answered(options);
       const std::uint64_t requests = runner_.port().requests - before;
+      one.in_doubt = is_polled() && (is_outstanding || one.unanswered != 0);
+      is_outstanding = one.in_doubt || (requests != 0 && !was_answered(one));
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
       // If the last reply was late, the replies to the requests before it are assumed to be late, not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
+      if (was_answered(one) && one.is_late()) readings.late += requests;
+      if (one.in_doubt && was_answered(one) && !one.is_late()) {
+        ++readings.in_doubt;
+        readings.good_in_doubt += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
+      }
       readings.discarded += one.discarded;
       return one;
     };
@@ -183,7 +211,7 @@ class Tester {
   // Returns whether the encoder can be read; if it cannot, a missing reply proves nothing.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
-      if (once(options_).error == Error::none) return true;
+      if (once_answered(options_).error == Error::none) return true;
     }
     return false;
   }
@@ -403,7 +431,9 @@ class Tester {
   Runner<Item> runner_;
   const Command& read_;
   std::size_t count_;
-  bool ended_ = false;  // whether ConformChoices::over ended the test
+  Time lateness_{};               // longest time to a late reply so far; 0: no reply was late
+  unsigned late_listenings_ = 0;  // number of waits for a late reply so far
+  bool ended_ = false;            // whether ConformChoices::over ended the test
   Readings readings_{};
 };
 

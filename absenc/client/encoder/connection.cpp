@@ -135,7 +135,9 @@ class ConnectionOn final : public Connection {
     requests_before_ = port_.requests;
     const auto note = [&](bool good) {
       change_ = change_after(way, command, arguments, good);
-      if (record) change_.note = record->keep(way, change_);
+      if (!record) return;
+      const std::string without_journal = record->keep(way, change_);
+      change_.note += (change_.note.empty() || without_journal.empty() ? "" : "; ") + without_journal;
     };
     try {
       Outcome ended = carry_out(command, arguments, on_emit);
@@ -263,7 +265,9 @@ class ConnectionOn final : public Connection {
   Change change_after(const EncoderAddress& before, const Command& command, Arguments arguments, bool good) const {
     const ChangeSent sent = port_.requests != requests_before_ ? session_.change_sent() : ChangeSent::no;
     if (sent == ChangeSent::no) return {ChangeState::not_sent};
-    if (good) return {ChangeState::confirmed, new_way(before, command, arguments)};
+    const std::string noted(session_.change_note());
+    if (good && sent == ChangeSent::unproven) return {ChangeState::unknown, {}, noted};
+    if (good) return {ChangeState::confirmed, new_way(before, command, arguments), noted};
     if (sent == ChangeSent::refused) return {ChangeState::refused};
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }

@@ -38,13 +38,17 @@ struct Attempted {
   Time answered_after{};  // time from the end of the request to the beginning of the reply; 0 without a reply
   // greatest time to the beginning of the reply (`answered_after`) that protocol and connection allow; 0: no limit
   Time limit{};
-  Time after{};  // time from the end of the request to the end of the reply; meaningless without a reply
+  Time latency{};    // delay that the connection may have added to `answered_after`; it is a part of `limit`, too
+  Time sent_late{};  // the request may have ended earlier by up to this time, and `answered_after` be longer by it
+  Time after{};      // time from the end of the request to the end of the reply; meaningless without a reply
   // greatest time to the end of the reply (`after`) that the protocol allows for a reply of this length
   Time allowed{};
   std::optional<Reading> reading{};
   // value of the first field of the reply that counts replies; nothing: no field does, or no reply came
   std::optional<std::int64_t> counter{};
   const FieldInfo* counter_field = nullptr;
+  // whether a request before was not answered, so that the reply may be a late one to that request
+  bool in_doubt = false;
   bool possible = true;  // whether the unit has a command that can be run with the options of the encoder
 
   /// Returns whether there is a reply with a time limit and it began after that limit.
@@ -299,6 +303,8 @@ class Runner {
     if (asked) {
       one.answered_after = line.answered_after(character_);
       one.limit = line.answer != Time{} ? line.answer + latency_ : Time{};
+      one.latency = latency_;
+      one.sent_late = line.sent_late;
       one.after = line.received_at - line.sent_at;
       one.allowed = line.answer + static_cast<std::int64_t>(received.size()) * character_;
     }

@@ -32,8 +32,11 @@ TEST(Amt21, RestartsFor200MsAfterZeroAndReset) {
 TEST(Amt21, ZeroNeedsShaftAtRestAndIsVerified) {
   Bench bench(unit, "");
   bench.shaft.put(3, 0x4000'0000);
-  EXPECT_EQ(bench.run("zero").error, Error::none);
+  const author::testing::RunResult zeroed = bench.run("zero");
+  EXPECT_EQ(zeroed.error, Error::none);
+  EXPECT_EQ(zeroed.change, ChangeSent::yes);
   EXPECT_EQ(bench.run("position").numbers["singleturn"], 0);
+  EXPECT_EQ(bench.run("zero").change, ChangeSent::unproven);
   bench.tampered.replies([](unsigned nth, auto& reply) {
     if (nth > 2) reply = {0xAB, 0x61};
   });

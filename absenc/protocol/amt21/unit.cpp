@@ -56,12 +56,15 @@ Procedure restart(Dialog& dialog, PositionAndTurns& found, Ask command_kind) {
   } else {
     co_await look(dialog, found, request<Ask::position>(dialog.format()));
   }
+  const std::uint64_t before = found.reading.singleturn;
   co_await dialog.ask({command_kind, dialog.format().address}).changes();
   co_await dialog.rest(restart_time + between_looks);
   const Result<Reply> answer = co_await dialog.attempt(request<Ask::position>(dialog.format()));
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};
   const std::uint64_t now = co_await look(dialog, found, request<Ask::position>(dialog.format()));
-  if (command_kind == Ask::zero && !is_near(now, 0, dialog.format().singleturn_bits)) {
+  const unsigned bits = dialog.format().singleturn_bits;
+  if (command_kind == Ask::zero) note_zero(dialog, before, now, bits, standstill_millidegrees);
+  if (command_kind == Ask::zero && !is_near(now, 0, bits)) {
     co_return {Error::cross_check_failed, "the position is still not zero",
                "hold the shaft still, then `absenc zero` again"};
   }

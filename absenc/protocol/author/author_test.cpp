@@ -314,10 +314,32 @@ TEST(Scan, RequestsEachAddress) {
   Bench silent(nothing);
   silent.run(alone);
   EXPECT_EQ(alone.error(), Error::timeout);
-  Host anywhere({}, {}, arena);
-  Bench noise(echo);
-  noise.run(anywhere);
-  EXPECT_EQ(anywhere.error(), Error::wrong_length);
+}
+
+constexpr std::uint8_t same_request(std::size_t) { return 1; }
+
+// Eight encoders with consecutive addresses are a correct line; noise, and a device that ignores the address, are not.
+TEST(Scan, OnlyDamageAndSameRepliesAreNoEncoders) {
+  const auto error_with = [](const auto& device) {
+    using Host = author::Run<Toy, Nodes<8>, scan<Toy, 8, request_to>>;
+    alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+    Host host({}, {}, arena);
+    Bench bench(device);
+    bench.run(host);
+    return std::pair(host.error(), std::ranges::count(host.found().there, true));
+  };
+  EXPECT_EQ(error_with(echo), std::pair(Error::none, std::ptrdiff_t{8}));
+  EXPECT_EQ(error_with([](std::uint8_t, unsigned) { return Wire{1}; }).first, Error::wrong_length);
+  // By chance, a damaged reply may be followed by a good one.
+  EXPECT_EQ(error_with([](std::uint8_t request, unsigned n) { return n % 2 == 0 ? Wire{1} : echo(request, n); }).first,
+            Error::wrong_length);
+  // An encoder that ignores the address gives the same good reply to each of them.
+  using Host = author::Run<Toy, Nodes<8>, scan<Toy, 8, same_request>>;
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  Host host({}, {}, arena);
+  Bench(echo).run(host);
+  EXPECT_EQ(host.error(), Error::wrong_length);
+  EXPECT_EQ(host.detail(), "every address gets the same reply: a device that ignores the address");
 }
 
 constexpr std::uint8_t request_to_all() { return 9; }

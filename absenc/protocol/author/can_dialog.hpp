@@ -55,6 +55,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// `overhear`.
   using CanEngine::came_early;
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
+  [[nodiscard]] std::string_view change_note() const final { return noted(); }
   /// Stores the last awaited frame as the answer to the request, for `exchange`.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 

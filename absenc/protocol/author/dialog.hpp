@@ -215,6 +215,7 @@ class AskingDialog : public HostOf<P>, public Routine {
   /// `only`.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
+  [[nodiscard]] std::string_view change_note() const final { return noted(); }
   [[nodiscard]] Reading carried() const final {
     if constexpr (carries_position) return carried_;
     return {};

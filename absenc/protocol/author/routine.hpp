@@ -68,11 +68,24 @@ class Routine {
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
   /// Notes that requests from now on may change the encoder.
-  void changes() { change_ = ChangeSent::yes; }
+  void changes() {
+    change_ = ChangeSent::yes;
+    change_note_ = {};
+  }
   /// Notes that the request after the call of `changes` has not changed the encoder.
   void refused() { change_ = ChangeSent::refused; }
-  /// Returns what `changes` or `refused` noted last; `no` if neither was called.
+  /// Notes that reading back would give the same if the encoder had ignored the request after the call of `changes`.
+  /// `why`: a text for people.
+  void unproven(std::string_view why) {
+    change_ = ChangeSent::unproven;
+    change_note_ = why;
+  }
+  /// Notes what the request after the call of `changes` changed besides; a text for people.
+  void note_change(std::string_view note) { change_note_ = note; }
+  /// Returns what `changes`, `refused` or `unproven` noted last; `no` if none was called.
   [[nodiscard]] ChangeSent change() const { return change_; }
+  /// Returns the text that `unproven` or `note_change` noted last; empty: none.
+  [[nodiscard]] std::string_view noted() const { return change_note_; }
 
   /// Returns an awaitable that ends the procedure: `co_await dialog.stop({Error::busy, "..."})`.
   [[nodiscard]] auto stop(const Outcome& outcome) {
@@ -116,6 +129,7 @@ class Routine {
   std::size_t used_ = 0;
   std::size_t most_used_ = 0;
   ChangeSent change_ = ChangeSent::no;
+  std::string_view change_note_{};
   std::coroutine_handle<> current_{};
   std::coroutine_handle<> next_{};
 };

@@ -8,6 +8,7 @@
 #include "absenc/core/angle.hpp"
 #include "absenc/core/time.hpp"
 #include "absenc/protocol/author/routine.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::author {
 
@@ -32,6 +33,42 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   const std::int64_t apart = wrapped_difference(counts, other, bits);
   const std::int64_t limit = counts_of_angle(bits, millidegrees);
   return apart <= limit && -apart <= limit;
+}
+
+/// Notes in `routine` what the position `now` shows of a request that was to make it `wanted`. `before`: the position
+/// before the request; all of them have `bits` bits. `limit`: greatest distance in counts of a position that counts as
+/// the wanted one; `still`: the same for an unchanged position.
+inline void note_placed(Routine& routine, std::uint64_t before, std::uint64_t now, std::uint64_t wanted, unsigned bits,
+                        std::int64_t limit, std::int64_t still) {
+  const auto are_near = [bits](std::uint64_t one, std::uint64_t other, std::int64_t most) {
+    const std::int64_t apart = wrapped_difference(one, other, bits);
+    return apart <= most && -apart <= most;
+  };
+  if (are_near(now, wanted, limit) && are_near(before, wanted, limit)) {
+    routine.unproven(
+        "the position was already there before, to within the tolerance of the check (0.35 degrees at most), so it "
+        "cannot show whether the encoder obeyed: turn the shaft and try again");
+  } else if (!are_near(now, wanted, limit) && are_near(now, before, still)) {
+    routine.refused();
+  }
+}
+/// Notes in `routine` what the position `now` shows of a zero; `millidegrees`: greatest distance from 0.
+inline void note_zero(Routine& routine, std::uint64_t before, std::uint64_t now, unsigned bits,
+                      std::uint32_t millidegrees = zero_millidegrees) {
+  note_placed(routine, before, now, 0, bits, counts_of_angle(bits, millidegrees), counts_of_angle(bits));
+}
+
+/// Notes in `routine` if the command of this purpose, which was obeyed, changed turns or position that it must leave.
+/// The turns of a standing shaft may change by one, because its position may pass zero.
+inline void note_side_effects(Routine& routine, Verb verb, const Reading& before, const Reading& now) {
+  const bool has_turns = before.multiturn_validity() == Validity::valid && now.multiturn_validity() == Validity::valid;
+  const std::int64_t turns = has_turns ? wrapped_difference(now.multiturn, before.multiturn, now.multiturn_bits) : 0;
+  const bool has_moved = verb != Verb::zero && !is_near(now.singleturn, before.singleturn, now.singleturn_bits);
+  const bool has_turned = verb != Verb::reset_multiturn && (turns < -1 || turns > 1);
+  if (!routine.noted().empty() || (!has_moved && !has_turned)) return;
+  routine.note_change(has_turned ? "the turns changed too, though the shaft stood still: compare them with those before"
+                                 : "the position within the turn changed too, though the shaft stood still: find the "
+                                   "origin again");
 }
 
 /// Returns not_still if two readings `between_looks` apart show a turning shaft; else no error.

@@ -37,6 +37,8 @@ struct RunResult : FieldSink {
     error = conversation.error();
     detail = conversation.detail();
     advice = conversation.advice();
+    change = conversation.change_sent();
+    note = conversation.change_note();
     if (const Reading* const now = conversation.reading()) reading = *now;
     conversation.report(*this);
     sent = wire(conversation.exchange().sent);
@@ -47,6 +49,8 @@ struct RunResult : FieldSink {
   Error error = Error::none;
   std::string detail;
   std::string advice;
+  ChangeSent change = ChangeSent::no;
+  std::string note;  // what the conversation noted of its change
   std::optional<Reading> reading;
   Numbers numbers;
   std::map<std::string, std::string> texts;

@@ -40,6 +40,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
+  [[nodiscard]] std::string_view change_note() const final { return this->noted(); }
   [[nodiscard]] Reading carried() const final { return has_position_ ? this->position() : Reading{}; }
   /// Makes the dialog accept frames without process data; the CDS of such frames is valid.
   void accept_empty_frames() { accepts_empty_ = true; }

@@ -126,11 +126,34 @@ Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
   }
   co_await dialog.ask({letter::zero}).changes();
   const Reply now = co_await dialog.ask({letter::decimal});
+  if (is_near(dialog, now.number, 0) && is_near(dialog, second.number, 0)) {
+    dialog.unproven(
+        "the position was zero before already, so it cannot show whether the zero was set: turn the shaft "
+        "and try again");
+  }
   if (!is_near(dialog, now.number, 0)) {
+    if (is_near(dialog, now.number, second.number)) dialog.refused();
     co_return {Error::cross_check_failed, "the position is not zero afterwards",
                "hold the shaft still, then `absenc run ... set-zero` again"};
   }
   found.counts = now.number;
+  co_return done;
+}
+
+Procedure clear_zero(Dialog& dialog, InterfaceResults& found) {
+  const Reply first = co_await dialog.ask({letter::decimal});
+  const Reply second = co_await dialog.ask({letter::decimal}).after(author::between_looks);
+  co_await dialog.ask({letter::clear_zero}).changes();
+  const Reply now = co_await dialog.ask({letter::decimal}).or_say("it was sent, but the position could not be read");
+  found.counts = now.number;
+  // Only the position shows the interface's zero. While the shaft turns, it changes anyway.
+  if (!is_near(dialog, second.number, first.number)) {
+    dialog.unproven(
+        "the shaft turns, so the position cannot show whether the zero was cleared: hold it still and look "
+        "again");
+  } else if (is_near(dialog, now.number, second.number)) {
+    dialog.unproven("the position is the same as before: no zero was set, or the interface did not clear it");
+  }
   co_return done;
 }
 

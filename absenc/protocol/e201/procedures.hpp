@@ -72,6 +72,8 @@ author::Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments a
 author::Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on);
 /// Sets the zero of `?` with `z`. Errors: those of the exchanges, not_still, invalid_argument, cross_check_failed.
 author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
+/// Clears the zero of `?` with `a`, and reads the position before and after. Errors: those of the exchanges.
+author::Procedure clear_zero(Dialog& dialog, InterfaceResults& found);
 /// Reads frames at each clock, and emits the results after each clock; at the end restores the clock that was set
 /// before.
 author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);

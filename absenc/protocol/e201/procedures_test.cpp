@@ -177,7 +177,7 @@ TEST(E201Set, ReadsClockBack) {
 TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {
-    const CommandResult told = bench.run_tampered(answering('a', {{"ok\r", after}}), "clear-zero");
+    const CommandResult told = bench.run_tampered(answering('0', {{"ok\r", after}}), "stream-off");
     EXPECT_EQ(told.error, "none");
     EXPECT_EQ(told.fields, (Fields{{"command", 0}}));
     return told.took;
@@ -218,8 +218,39 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", -10}}));
   // The zero of the interface does not change the position that the command `position` reads.
   EXPECT_EQ(bench.run("position").fields.at("singleturn"), 275086);
-  EXPECT_EQ(bench.run("clear-zero").error, "none");
+  EXPECT_EQ(bench.run("clear-zero").fields, (Fields{{"counts", 275086}}));
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
+}
+
+// Only the position shows the interface's zero: if it is the same before and after, it proves nothing.
+TEST(E201Zero, IsProvenByChangedPositionOnly) {
+  struct Case {
+    const char* command;
+    std::vector<std::string> looks;
+    std::string error;
+    ChangeSent change;
+    const char* note;
+  };
+  for (const Case& one : std::vector<Case>{
+           {"clear-zero", {"0", "0", "275096"}, "none", ChangeSent::yes, ""},
+           {"clear-zero", {"275096", "275096", "275096"}, "none", ChangeSent::unproven, "no zero was set, or"},
+           {"clear-zero", {"100", "500", "900"}, "none", ChangeSent::unproven, "the shaft turns"},
+           {"set-zero", {"100", "100", "0"}, "none", ChangeSent::yes, ""},
+           {"set-zero", {"10", "10", "10"}, "none", ChangeSent::unproven, "was zero before"},
+           {"set-zero", {"100", "100", "100"}, "cross_check_failed", ChangeSent::refused, ""},
+           {"set-zero", {"100", "100", "200"}, "cross_check_failed", ChangeSent::yes, ""}}) {
+    Bench bench;
+    std::size_t look = 0;
+    const Tamper tamper = [&](char letter) {
+      const bool answers = letter == '?' && look < one.looks.size();
+      return answers ? std::optional(std::vector<TextReply>{{one.looks[look++] + "\r"}}) : std::nullopt;
+    };
+    const CommandResult ended = bench.run_tampered(tamper, one.command);
+    EXPECT_EQ(ended.error, one.error) << one.command << one.looks.back();
+    EXPECT_EQ(ended.change, one.change) << one.command << one.looks.back();
+    EXPECT_TRUE(says(ended.note, one.note)) << ended.note;
+    EXPECT_EQ(ended.note.empty(), one.change != ChangeSent::unproven) << ended.note;
+  }
 }
 
 // The command set-zero refuses if two positions differ by more than 0.02 degrees (29 counts of 19 bits) and more than

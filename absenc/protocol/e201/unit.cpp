@@ -232,7 +232,8 @@ constexpr auto commands = std::array{
     reading<report, asks<letter::width>>({"width", Verb::config_get, 0, "width of the position that ? gives"}),
     command<report, found, set_zero, does<letter::zero>>(
         {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
-    reading<report, asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "clear that zero", {}, true, false}),
+    command<report, found, clear_zero, does<letter::clear_zero>>(
+        {"clear-zero", Verb::run, 0, "clear that zero", {}, true, false}),
     reading<report, asks<letter::decimal>>({"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
     command<report, found, switch_supply, does<letter::supply_on>, true>(
         {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),

@@ -228,6 +228,8 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
     const std::uint16_t now = co_await write_word_21(dialog, selected, places[i], values[i],
                                                      "the datum shift was written, but could not be read back");
     if (now != values[i]) {
+      const bool is_first_change = i == 0 || values[0] == low;
+      if (is_first_change && now == (i == 0 ? low : high)) dialog.refused();
       co_return {
           Error::cross_check_failed,
           "the encoder has another datum shift than was written: its operating parameters may be write-protected",
@@ -247,6 +249,11 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
   if (!is_zero) {
     co_return {Error::cross_check_failed, "the datum shift is stored, but the position is not zero",
                "hold the shaft still; if it stays so, try the other value of the option datum_shift"};
+  }
+  if (wanted == before) {
+    dialog.unproven(
+        "the position was within half a signal period of zero before, so the datum shift is the same and cannot show "
+        "whether the encoder stored it: turn the shaft and try again");
   }
   co_return done;
 }

@@ -127,8 +127,15 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
   show_last(dialog, found);
+  if (id == DataId::zero) {
+    author::note_zero(dialog, before.singleturn, now.singleturn, singleturn_bits, author::standstill_millidegrees);
+  }
   const Explanation what = failed_part(found.words, id, before, now);
   if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
+  const Verb verb = id == DataId::zero           ? Verb::zero
+                    : id == DataId::clear_alarms ? Verb::clear_alarms
+                                                 : Verb::reset_multiturn;
+  author::note_side_effects(dialog, verb, to_reading(before), to_reading(now));
   co_return done;
 }
 

@@ -91,9 +91,23 @@ TEST(HiperfaceChanges, IgnoredRequestIsFailureWithoutChange) {
            change.code == 0x57 ? 0xE6 : static_cast<std::uint8_t>(change.arguments.empty() ? 0 : change.arguments[0]));
     const Talk<std::uint8_t> talk(unit, bench.options, change.command, change.arguments);
     EXPECT_EQ(bench.run(*talk).error, Error::cross_check_failed);
-    const bool shows_no_change = change.code != 0x43 && change.code != 0x49;
+    const bool shows_no_change = change.code != 0x49;
     EXPECT_EQ(talk->change_sent(), shows_no_change ? ChangeSent::refused : ChangeSent::yes);
   }
+}
+TEST(HiperfaceChanges, PositionThatWasThereBeforeProvesNothing) {
+  for (const bool ignores : {true, false}) {
+    Bench bench(unit, "singleturn_bits=12 multiturn_bits=12");
+    bench.shaft.put(9, std::int64_t{3} << 20);
+    if (ignores) ignore(bench, 0x43, 0);
+    const RunResult near = bench.run("zero");
+    EXPECT_EQ(near.error, Error::none);
+    EXPECT_EQ(near.change, ChangeSent::unproven);
+    EXPECT_NE(near.note.find("cannot show whether the encoder obeyed"), std::string::npos) << near.note;
+  }
+  Bench bench(unit, "singleturn_bits=12 multiturn_bits=12");
+  bench.shaft.put(9, std::int64_t{3} << 20);
+  EXPECT_EQ(bench.run("reset-multiturn").change, ChangeSent::yes);
 }
 TEST(HiperfaceChanges, PositionIsComparedInBothDirections) {
   for (const std::int64_t place : {0x4000'0000LL, 0xC000'0000LL}) {

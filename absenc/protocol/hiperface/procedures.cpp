@@ -116,8 +116,8 @@ Part<Reading> may_set(Dialog& dialog, ProcedureResult& found, bool needs_turns) 
   co_return second;
 }
 
-// Sends one request that sets the position, and reads the position back.
-Part<bool> store_position(Dialog& dialog, ProcedureResult& found, std::uint32_t position) {
+// Sends one request that sets the position, and reads the position back. `before`: the position until now.
+Part<bool> store_position(Dialog& dialog, ProcedureResult& found, const Reading& before, std::uint32_t position) {
   Request request = plain_request(dialog.format(), CommandCode::set_position);
   request.position = position;
   request.code = dialog.format().code0;
@@ -129,6 +129,8 @@ Part<bool> store_position(Dialog& dialog, ProcedureResult& found, std::uint32_t 
   const Format& format = dialog.format();
   const std::int64_t apart = wrapped_difference(whole_position(format, now), position, format.position_bits());
   const std::int64_t limit = counts_of_angle(format.resolution().singleturn_bits, zero_millidegrees);
+  note_placed(dialog, whole_position(format, before), whole_position(format, now), position, format.position_bits(),
+              limit, counts_of_angle(format.resolution().singleturn_bits));
   if (apart > limit || -apart > limit) {
     co_await dialog.stop({Error::cross_check_failed, "the position is another one than was set",
                           "hold the shaft still, then try again"});
@@ -196,7 +198,7 @@ Procedure set_zero(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   const Resolution bits = dialog.format().resolution();
   const Reading now = co_await may_set(dialog, found, bits.multiturn_bits != 0);
-  co_await store_position(dialog, found, static_cast<std::uint32_t>(now.multiturn << bits.singleturn_bits));
+  co_await store_position(dialog, found, now, static_cast<std::uint32_t>(now.multiturn << bits.singleturn_bits));
   co_return done;
 }
 
@@ -204,7 +206,7 @@ Procedure reset_multiturn(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   if (dialog.format().resolution().multiturn_bits == 0) co_return {Error::unsupported, "this encoder has no turns"};
   const Reading now = co_await may_set(dialog, found, false);
-  co_await store_position(dialog, found, static_cast<std::uint32_t>(now.singleturn));
+  co_await store_position(dialog, found, now, static_cast<std::uint32_t>(now.singleturn));
   co_return done;
 }
 
@@ -213,8 +215,8 @@ Procedure set_position(Dialog& dialog, ProcedureResult& found, Arguments argumen
   if (arguments[0] >> dialog.format().position_bits() != 0) {
     co_return {Error::invalid_argument, "this encoder has no such position; nothing was changed"};
   }
-  co_await may_set(dialog, found, false);
-  co_await store_position(dialog, found, static_cast<std::uint32_t>(arguments[0]));
+  const Reading now = co_await may_set(dialog, found, false);
+  co_await store_position(dialog, found, now, static_cast<std::uint32_t>(arguments[0]));
   co_return done;
 }
 

@@ -55,8 +55,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, Code code) {
   co_await send_in_a_row(dialog, request_of(dialog.format(), code), row);
   co_await dialog.rest(memory_write_time);
   const Reading now = co_await look(dialog, found);
+  if (code == Code::zero) note_zero(dialog, second.singleturn, now.singleturn, now.singleturn_bits);
   const Explanation what = failed_part(code, now);
   if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
+  const Verb verb = code == Code::zero           ? Verb::zero
+                    : code == Code::clear_alarms ? Verb::clear_alarms
+                                                 : Verb::reset_multiturn;
+  note_side_effects(dialog, verb, second, now);
   co_return done;
 }
 

@@ -319,6 +319,58 @@ TEST(TformatProcedures, DetectsResetThatFailed) {
   }
 }
 
+// The zero and the verification are read 0.35 degrees apart at most: 127 of 2^17 counts.
+TEST(TformatProcedures, ZeroThatMayHaveBeenIgnoredIsUnproven) {
+  struct Row {
+    std::int64_t before;
+    std::uint32_t now;
+    Error error;
+    ChangeSent change;
+  };
+  for (const Row& row :
+       {Row{120, 120, Error::none, ChangeSent::unproven}, Row{127, 0, Error::none, ChangeSent::unproven},
+        Row{128, 0, Error::none, ChangeSent::yes}, Row{128, 127, Error::none, ChangeSent::yes},
+        Row{4000, 4000, Error::cross_check_failed, ChangeSent::refused},
+        Row{4000, 4007, Error::cross_check_failed, ChangeSent::refused},
+        Row{4000, 4008, Error::cross_check_failed, ChangeSent::yes},
+        Row{4000, 200, Error::cross_check_failed, ChangeSent::yes}}) {
+    Bench bench([&row](unsigned index, Wire& reply) {
+      const auto place = static_cast<std::uint32_t>(index == 12 ? row.now : row.before);
+      if (index < 2 || index == 12) reply = wire(Reply{.singleturn = place, .encoder_id = 0x11});
+    });
+    const auto zero = bench.run("zero");
+    EXPECT_EQ(zero.error, row.error) << row.before << " " << row.now;
+    EXPECT_EQ(zero.change, row.change) << row.before << " " << row.now;
+    EXPECT_EQ(zero.note.empty(), row.change != ChangeSent::unproven) << zero.note;
+  }
+}
+
+TEST(TformatProcedures, NotesWhatAResetChangedBesides) {
+  struct Row {
+    std::string_view name;
+    Reply verification;
+    std::string_view note;
+  };
+  for (const Row& row :
+       {Row{"zero", {.multiturn = 777, .encoder_id = 0x11}, "the turns changed too"},
+        Row{"zero", {.multiturn = 13, .encoder_id = 0x11}, ""},
+        Row{"reset-multiturn", {.singleturn = 20000, .encoder_id = 0x11}, "the position within the turn"},
+        Row{"reset-multiturn", {.singleturn = 4003, .encoder_id = 0x11}, ""},
+        Row{"clear-alarms", {.singleturn = 500, .multiturn = 12, .encoder_id = 0x11}, "the position"},
+        Row{"clear-alarms", {.singleturn = 4000, .multiturn = 777, .encoder_id = 0x11}, "the turns"},
+        Row{"clear-alarms", {.singleturn = 4000, .multiturn = 12, .encoder_id = 0x11}, ""}}) {
+    Bench bench([&row](unsigned index, Wire& reply) {
+      if (index == 12) reply = wire(row.verification);
+    });
+    bench.shaft.put(12, 4000);
+    const auto reset = bench.run(row.name);
+    EXPECT_EQ(reset.error, Error::none) << reset.detail;
+    EXPECT_EQ(reset.change, ChangeSent::yes) << row.name;
+    EXPECT_EQ(reset.note.empty(), row.note.empty()) << row.name << ": " << reset.note;
+    EXPECT_EQ(reset.note.find(row.note), 0U) << row.name << ": " << reset.note;
+  }
+}
+
 TEST(TformatProcedures, LostReplyStopsAResetUnlessItIsTheTenth) {
   const auto lose = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {

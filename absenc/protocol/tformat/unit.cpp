@@ -85,8 +85,14 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
   static_cast<Values&>(found) = values_of(dialog.format(), now);
   found.reading = dialog.last_reading();
-  const Explanation what = failed_part(id, now, dialog.format().singleturn_bits);
+  const unsigned bits = dialog.format().singleturn_bits;
+  if (id == DataId::zero) note_zero(dialog, second.singleturn, now.singleturn, bits, zero_tolerance_millidegrees);
+  const Explanation what = failed_part(id, now, bits);
   if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
+  const Verb verb = id == DataId::zero              ? Verb::zero
+                    : id == DataId::reset_multiturn ? Verb::reset_multiturn
+                                                    : Verb::clear_alarms;
+  note_side_effects(dialog, verb, to_reading(dialog.format(), second), found.reading);
   co_return done;
 }
 

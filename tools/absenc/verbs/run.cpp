@@ -105,7 +105,11 @@ int run_command(const Invocation& invocation, const EncoderAddress& uri, const C
   FieldTable rows;
   const bool json = invocation.has("--json");
   encoder->report(json ? static_cast<FieldSink&>(fields) : rows);
-  if (!outcome.change.note.empty()) print_message(fmt::format("note: {}", outcome.change.note));
+  if (outcome.change.state == ChangeState::unknown) {
+    print_message(fmt::format("note: {}", outcome.change.text()));
+  } else if (!outcome.change.note.empty()) {
+    print_message(fmt::format("note: {}", outcome.change.note));
+  }
   if (json) {
     Json answer = Json::object().set("ok", !outcome.aborted).set("fields", fields.fields);
     set_change(answer, outcome.change);

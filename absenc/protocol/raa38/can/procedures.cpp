@@ -184,6 +184,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
   const PositionResult second = co_await read_position(dialog, between_looks);
   if (second.outcome.error != Error::none) co_return second.outcome;
   found.after = zeroing ? second.counts : first.counts;
+  if (zeroing) note_zero(dialog, before.counts, second.counts, dialog.format().bits);
   co_return zeroing ? check_zero(dialog.format(), found, first.counts, second.counts)
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }

@@ -383,6 +383,7 @@ Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments) {
   const Result<Reply> now = co_await read_position(dialog, dialog.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};
   show_position(dialog, found);
+  note_zero(dialog, second.singleturn, now->singleturn, bits);
   if (is_near(now->singleturn, 0, bits, zero_millidegrees)) co_return done;
   co_return {Error::cross_check_failed, "the position is still not zero",
              "does the shaft turn? Try once more, not often: its memory wears"};

@@ -235,6 +235,7 @@ Procedure set_zero(Dialog& dialog, Values& found) {
     now = co_await read_next_position(dialog);
     found = values_of(format, *now);
     found.before = second->singleturn;
+    if (now) note_zero(dialog, second->singleturn, now->singleturn, format.bits);
     if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
   } while (dialog.received_at() < deadline);
   if (!now) {
