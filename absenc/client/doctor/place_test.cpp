@@ -40,8 +40,8 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
 }
 
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
-  for (const FindingKind finding_kind :
-       {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {
+  for (const FindingKind finding_kind : {FindingKind::reply_late, FindingKind::sometimes_late,
+                                         FindingKind::sometimes_silent, FindingKind::few_readings}) {
     EXPECT_THAT(advice_of(finding_kind, PortKind::serial), HasSubstr("latency="));
     EXPECT_THAT(advice_of(finding_kind, PortKind::tcp), HasSubstr("latency="));
     EXPECT_THAT(advice_of(finding_kind, PortKind::sim), Not(HasSubstr("latency=")));

@@ -324,6 +324,12 @@ constexpr auto elsewhere = std::to_array<Elsewhere>({
     {FindingKind::modem_answers, PortKind::can, "another device than an encoder is on this bus",
      "name another interface"},
     {FindingKind::sometimes_silent, PortKind::spi, "", "check plugs, supply and wires"},
+    {FindingKind::few_readings, PortKind::spi, "the encoder needs long for each reading",
+     "take at least 10, as with --for 30"},
+    {FindingKind::few_readings, PortKind::ftdi, "the encoder needs long for each reading",
+     "take at least 10, as with --for 30"},
+    {FindingKind::few_readings, PortKind::sim, "the encoder needs long for each reading, or this computer is busy",
+     "take at least 10, as with --for 30"},
     {FindingKind::sometimes_silent, PortKind::sim, "the virtual encoder has such a fault, or this computer is busy",
      "leave the fault out, or reduce the load of the computer"},
 });
