@@ -33,7 +33,8 @@ class Healthy(Case):
         with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
                       name=f"{unit}-{name}-{number}") as emulator:
             address = f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={name}" if name else "")
-            found = json.loads(absenc("doctor", address, "--json", "--for", "3").stdout)
+            # With this latency some units need more than half a second for a reading.
+            found = json.loads(absenc("doctor", address, "--json", "--for", "20", "--readings", "1000").stdout)
         print(f"{unit:14} {name or 'usual'}: {found['verdict'][:100]}", flush=True)
         if found["verdict"].startswith("good"):
             return ""

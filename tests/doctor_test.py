@@ -170,6 +170,29 @@ class Named(EncoderCase):
         with BabblingLine(period=0.002, pieces=(b"\x55\x12",)) as line:
             self.assert_found(f"tformat:{line.path}", "never_silent")
 
+    def test_device_that_takes_no_request(self):
+        """Its frames may pass for replies to the requests that it ignores."""
+        with BabblingLine(period=0.002, pieces=(GOOD_REPLY,)) as line:
+            result, found = doctor(f"tformat:{line.path}?{PATIENT}")
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertIn("never_silent", ids(found))
+
+    def test_few_readings_are_not_good(self):
+        # this encoder has 18 readings a second
+        result, found = doctor("sim:hiperface", "--for", "0.2")
+        self.assertEqual((result.returncode, ids(found)), (1, ["few_readings"]), result.stdout)
+        self.assertRegex(found["findings"][0]["evidence"], r"^only [1-9] readings? in ")
+        self.assertNotIn("good", found["verdict"])
+
+    def test_verdict_says_what_was_not_looked_at(self):
+        result, found = doctor("sim:hiperface?motion=rpm=60")
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertRegex(found["not_looked_at"][0], r"^jumps .*max_rpm")
+        self.assertIn(", ".join(found["not_looked_at"]), found["verdict"])
+        _, found = doctor("sim:hiperface?max_rpm=60&motion=rpm=50", "--turn", "2")
+        self.assertEqual(found["findings"], [])
+        self.assertNotIn("jumps", found["verdict"])
+
     def test_pseudo_terminal_has_no_wrong_baud_rate(self):
         for requested_rate, rate in ((2_000_000, 2_500_000), (2_500_000, 9_600)):
             with self.subTest(rate=rate), TurnedRate(rate, GOOD_REPLY) as line:

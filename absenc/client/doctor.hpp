@@ -88,7 +88,10 @@ enum class FindingKind : std::uint8_t {
   position_jumps,
   position_frozen,
   turns_stand,
+  turns_jump,
   stuck_bits,
+  // The following finding is about the examination itself.
+  few_readings,
 };
 
 /// Severity of a finding.
@@ -141,6 +144,8 @@ struct Examination {
   std::size_t good = 0;             ///< Number of good readings.
   Reported reported{};              ///< How many readings report alarms and validity.
   Measured measured{};              ///< Times, rates and settings that were measured.
+  /// Possible faults that the readings could not show, with the reason, as "a turning shaft (--turn)".
+  std::vector<std::string> not_looked_at{};
   bool complete = true;             ///< False if the diagnosis was interrupted.
 
   /// Returns whether the diagnosis is complete and no finding is a warning or a fault.

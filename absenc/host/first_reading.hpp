@@ -39,11 +39,45 @@ class FirstReading {
   /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
+  /// A position in counts, which includes the turns if they are valid and both fit in 64 bits.
+  struct Place {
+    std::uint64_t counts = 0;
+    std::uint8_t bits = 0;  ///< number of bits of `counts`; 0: there is no position
+    std::uint8_t singleturn_bits = 0;
+
+    /// Returns whether `counts` includes the turns.
+    [[nodiscard]] constexpr bool has_turns() const { return bits > singleturn_bits; }
+    /// Returns whether both are positions in the same counts, so that they can be compared.
+    [[nodiscard]] constexpr bool is_like(const Place& other) const {
+      return bits != 0 && bits == other.bits && singleturn_bits == other.singleturn_bits;
+    }
+    /// Returns the distance of two positions that are alike, in the shorter direction.
+    [[nodiscard]] constexpr std::uint64_t distance(const Place& other) const {
+      return FirstReading::distance(counts - other.counts, bits);
+    }
+  };
+  /// Returns the position of `reading`; one of 0 bits if it has none that can be compared.
+  [[nodiscard]] static constexpr Place place_of(const Reading& reading) {
+    if (!has_position(reading)) return {};
+    const unsigned bits = reading.singleturn_bits;
+    const unsigned all_bits = bits + reading.multiturn_bits;
+    if (!reading.multiturn_valid || reading.multiturn_bits == 0 || all_bits > 64) {
+      return {reading.singleturn, static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits)};
+    }
+    return {reading.multiturn << bits | reading.singleturn, static_cast<std::uint8_t>(all_bits),
+            static_cast<std::uint8_t>(bits)};
+  }
+  /// Returns the largest distance of two positions of `bits` bits that can be judged: 15/32 of 2^bits counts.
+  [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
+    constexpr std::uint64_t share = 15;
+    return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;
+  }
+
   /// Returns whether `reading` is near enough to the position stored the time `between` before; false if none is
   /// stored.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
-    if (!is_like_last(place)) return false;
+    if (!place.is_like(last_)) return false;
     const std::uint64_t step = place.counts - last_.counts;
     const std::uint64_t reached = reach(place, between);
     const std::uint64_t allowed = least(reached, most_judged(place.bits));
@@ -66,35 +100,13 @@ class FirstReading {
   /// Stores the position of `reading` for the next comparison, or the fact that `reading` has none.
   constexpr void keep(const Reading& reading) {
     const Place place = place_of(reading);
-    has_step_ = is_like_last(place);
+    has_step_ = place.is_like(last_);
     step_ = place.counts - last_.counts;
     last_ = place;
     latched_ = reading.latched;
   }
 
  private:
-  // A position in counts, which includes the turns if they are valid and both fit in 64 bits.
-  struct Place {
-    std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  // number of bits of `counts`; 0: there is no position
-    std::uint8_t singleturn_bits = 0;
-  };
-
-  [[nodiscard]] static constexpr Place place_of(const Reading& reading) {
-    if (!has_position(reading)) return {};
-    const unsigned bits = reading.singleturn_bits;
-    const unsigned all_bits = bits + reading.multiturn_bits;
-    if (!reading.multiturn_valid || reading.multiturn_bits == 0 || all_bits > 64) {
-      return {reading.singleturn, static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits)};
-    }
-    return {reading.multiturn << bits | reading.singleturn, static_cast<std::uint8_t>(all_bits),
-            static_cast<std::uint8_t>(bits)};
-  }
-
-  [[nodiscard]] constexpr bool is_like_last(const Place& place) const {
-    return place.bits != 0 && place.bits == last_.bits && place.singleturn_bits == last_.singleturn_bits;
-  }
-
   [[nodiscard]] static constexpr std::uint64_t least(std::uint64_t one, std::uint64_t other) {
     return one < other ? one : other;
   }
@@ -107,11 +119,6 @@ class FirstReading {
     constexpr std::uint64_t noise = 4;  // greatest noise of a position that is assumed, in counts
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
-  }
-  // Returns the largest distance of two positions of `bits` bits that can be judged: 15/32 of 2^bits counts.
-  [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
-    constexpr std::uint64_t share = 15;
-    return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;
   }
 
   Reach reach_;

@@ -39,6 +39,21 @@ TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   EXPECT_FALSE(confirmed(0, 32'768));
 }
 
+TEST(FirstReading, ComparesPositionsWithTheirTurnsIfTheseAreValid) {
+  const auto place = FirstReading::place_of(reading_at(5, 3, {}));
+  EXPECT_TRUE(place.has_turns());
+  EXPECT_EQ(place.distance(FirstReading::place_of(reading_at(131'071, 2, {}))), 6u);
+  EXPECT_EQ(place.distance(FirstReading::place_of(reading_at(5, 65'535, {}))), 4u << 17) << "past the end of the turns";
+  Reading invalid = reading_at(131'071, 2, {});
+  invalid.multiturn_valid = false;
+  const auto within = FirstReading::place_of(invalid);
+  EXPECT_FALSE(within.has_turns());
+  EXPECT_FALSE(within.is_like(place));
+  EXPECT_EQ(within.distance(FirstReading::place_of(of_bits(17, 5, {}))), 6u);
+  invalid.ready = false;
+  EXPECT_FALSE(FirstReading::place_of(invalid).is_like(FirstReading::place_of(invalid))) << "it has no position";
+}
+
 TEST(FirstReading, HasADefaultLimit) {
   const auto confirmed = [](std::uint64_t singleturn, Time later) {
     return agree(FirstReading(0), of_bits(13, 0, {}), of_bits(13, singleturn, later));

@@ -39,6 +39,7 @@ class Examination(NamedTuple):
     computer_late_ms: Optional[float] = None  #: greatest delay of this computer itself, if measured
     quickest_reply_ms: Optional[float] = None  #: shortest time from a request to the end of its reply
     slowest_reply_ms: Optional[float] = None  #: longest time from a request to the end of its reply
+    not_looked_at: Sequence[str] = ()  #: possible faults that the readings could not show, with the reason
 
 
 class Clause(NamedTuple):

@@ -262,6 +262,15 @@ std::vector<Fault> other_faults() {
                       return judged(
                           turned_by_hand([](std::size_t i) { return i * hand_counts; }, [](std::size_t) { return 3; }));
                     }});
+  faults.push_back({"turns_jump", [] {
+                      return judged(turned_by_hand([](std::size_t i) { return i * hand_counts; },
+                                                   [](std::size_t i) { return static_cast<std::int64_t>(i / 10); }));
+                    }});
+  faults.push_back({"few_readings", [] {
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      seen.readings.resize(3);
+                      return judged(seen);
+                    }});
   faults.push_back({"comes_and_goes", [] { return examine_contact(4s, [](Time at) { return at % 1s < 300ms; }); }});
   return faults;
 }
@@ -349,7 +358,7 @@ TEST(Doctor, EachFaultIsNamedRightAndFirst) {
     }
     named.insert(fault.id);
   }
-  for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::stuck_bits); ++i) {
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::few_readings); ++i) {
     EXPECT_TRUE(named.contains(std::string(id_of(static_cast<FindingKind>(i))))) << id_of(static_cast<FindingKind>(i));
   }
 }

@@ -152,6 +152,7 @@ class Doctor {
         if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace(is_serial(address_));
         examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
         if (watch) seen_.computer_late = watch->latest();
+        if (wired && !streams(address_)) examiner.listen_longer(seen_);
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
           examiner.read(*read_, most_turned, choices_.turning, seen_.turned);
@@ -342,7 +343,7 @@ class Doctor {
         FindingKind::no_answer,     FindingKind::only_echo,      FindingKind::baud_pattern,
         FindingKind::extra_bytes,   FindingKind::bytes_missing,  FindingKind::other_checksum,
         FindingKind::contradictory, FindingKind::always_damaged, FindingKind::direction_unswitched,
-        FindingKind::same_address};
+        FindingKind::same_address,  FindingKind::few_readings};
     return std::ranges::find(unsure, first->finding_kind) != unsure.end();
   }
 
@@ -415,6 +416,7 @@ Json to_json(const Examination& examination) {
     json.set("quickest_reply_ms", in_seconds(measured.quickest) * 1e3);
     json.set("slowest_reply_ms", in_seconds(measured.slowest) * 1e3);
   }
+  json.set("not_looked_at", Json::list(examination.not_looked_at));
   return json.set("verdict", examination.verdict());
 }
 

@@ -26,8 +26,8 @@ struct Surroundings {
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
 /// Converts the result to {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good",
-/// "complete","seconds","failures_below","verdict"}; if known, also "readings_per_second", "echo", "computer_late_ms",
-/// "latency_ms", "quickest_reply_ms", "slowest_reply_ms".
+/// "complete","seconds","failures_below","not_looked_at":[],"verdict"}; if known, also "readings_per_second", "echo",
+/// "computer_late_ms", "latency_ms", "quickest_reply_ms", "slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "absenc/client/doctor/observations.hpp"
@@ -40,6 +41,7 @@ class Examiner {
   void listen(Observations& seen) {
     if constexpr (!std::is_same_v<Item, CanFrame>) {
       unsigned busy = 0;
+      std::optional<unsigned> first;
       for (unsigned piece = 0; piece < pieces; ++piece) {
         bool heard = false;
         runner_.listen(piece_time, [&](Bytes bytes) {
@@ -48,10 +50,32 @@ class Examiner {
             seen.unsolicited.insert(seen.unsolicited.end(), bytes.begin(), bytes.end());
           return true;
         });
-        busy += heard ? 1 : 0;
+        if (!heard) continue;
+        ++busy;
+        // A single late reply lies in one period, or in two that follow one another.
+        if (piece - first.value_or(piece) >= 2) seen.sends_unasked = true;
+        if (!first) first = piece;
       }
       seen.listened = pieces * piece_time;
       seen.never_silent = busy + 1 >= pieces;
+    }
+  }
+
+  /// Listens once more if the first 100 ms were too short to notice an encoder that sends by itself: if its frames pass
+  /// for replies, the slowest of them shows how far apart they are.
+  void listen_longer(Observations& seen) {
+    if constexpr (!std::is_same_v<Item, CanFrame>) {
+      if (seen.sends_unasked || seen.readings.empty() || seen.readings.back().error != Error::none) return;
+      Time slowest{};
+      for (const Attempted& one : seen.readings) slowest = std::max(slowest, one.answered_after);
+      if (slowest <= piece_time) return;
+      const Time time = std::min(2 * slowest, longest_silence);
+      runner_.listen(time, [&](Bytes bytes) {
+        seen.unsolicited.insert(seen.unsolicited.end(), bytes.begin(), bytes.end());
+        seen.sends_unasked = true;
+        return false;
+      });
+      seen.listened += time;
     }
   }
 
@@ -182,6 +206,7 @@ class Examiner {
 
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
+  static constexpr Time longest_silence = std::chrono::seconds(1);
   static constexpr std::size_t most_heard = 4096;
   // longest time for which a loose contact is assumed to be open
   static constexpr Time longest_gap = std::chrono::milliseconds(500);

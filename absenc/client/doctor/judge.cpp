@@ -243,9 +243,14 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   const std::string inverted = in_doubt ? inversion(one) : "";
   if (!inverted.empty()) {
     findings.push_back(finding(FindingKind::line_inverted, {inverted}));
-  } else if (seen.never_silent && one.good * 100 < seen.readings.size() * 99 + 1) {
-    findings.push_back(finding(FindingKind::never_silent, {fmt::format("{}", seen.unsolicited.size()),
-                                                           to_text(seen.listened), hex(seen.unsolicited, 8)}));
+  } else if (seen.never_silent || seen.sends_unasked) {
+    Finding found = finding(FindingKind::never_silent,
+                            {fmt::format("{}", seen.unsolicited.size()), to_text(seen.listened),
+                             hex(seen.unsolicited, 8), seen.never_silent ? "without a pause" : "repeatedly"});
+    // The readings may be good nevertheless, or frames that nobody requested pass for replies.
+    const bool good_nevertheless = one.good * 100 > seen.readings.size() * 99;
+    if (!seen.never_silent || good_nevertheless) found.severity = Severity::warning;
+    findings.push_back(std::move(found));
   }
   if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
@@ -314,18 +319,30 @@ Measured measured_of(const Unit& unit, const Observations& seen, std::size_t goo
 Reported reported_by(const Unit& unit, const Observations& seen) {
   Reported reported;
   const std::size_t all = alarm_names(unit, ~0u).size();
+  // Without any alarm and status no reply reports that a position is invalid, so none reports that it is valid.
+  const bool reports_validity = unit.alarms != nullptr || unit.status != nullptr;
   std::uint32_t ever = 0;
   for (const Attempted& attempt : seen.readings) {
     if (!attempt.reading) continue;
     const std::uint32_t mask = attempt.reading->alarms_reported;
     ever |= mask;
     if (all != 0 && alarm_names(unit, mask).size() == all) ++reported.alarms;
-    if (attempt.reading->singleturn_validity() == Validity::valid) ++reported.valid;
+    if (reports_validity && attempt.reading->singleturn_validity() == Validity::valid) ++reported.valid;
   }
   for (const std::string_view name : alarm_names(unit, ~ever)) {
     reported.missing += fmt::format("{}{}", reported.missing.empty() ? "" : ", ", name);
   }
   return reported;
+}
+
+// Adds a finding if nothing else was found in so few readings that they show nothing.
+void judge_count(const Case& one, Examination& result) {
+  constexpr std::size_t enough = 10;
+  if (one.good >= enough || !result.complete || result.first() != nullptr) return;
+  const std::vector<Attempted>& readings = one.seen.readings;
+  const Time time = readings.empty() ? Time{} : readings.back().began + readings.back().after - readings.front().began;
+  result.findings.push_back(finding(FindingKind::few_readings,
+                                    {fmt::format("{} reading{}", one.good, one.good == 1 ? "" : "s"), to_text(time)}));
 }
 
 }  // namespace
@@ -354,8 +371,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
     judge_state(one, result.findings);
     judge_counter(one, result.findings);
     result.reported = reported_by(unit, seen);
-    judge_position(one, seen.readings, false, result.findings);
-    judge_position(one, seen.turned, true, result.findings);
+    judge_position(one, seen.readings, false, result);
+    if (result.measured.turned) judge_position(one, seen.turned, true, result);
   }
   const std::size_t failed = result.tried - result.good;
   if (failed * 20 > result.tried && result.first() == nullptr) {
@@ -371,6 +388,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
                                           : some_silence(seen, failed, result.tried));
     }
   }
+  if (!result.measured.turned) result.not_looked_at.emplace_back("a turning shaft (--turn)");
+  judge_count(one, result);
   for (Finding& found : result.findings) suit(found, seen.place);
   std::stable_sort(result.findings.begin(), result.findings.end(), [](const Finding& before, const Finding& after) {
     return before.finding_kind < after.finding_kind;

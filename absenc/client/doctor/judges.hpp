@@ -44,8 +44,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 [[nodiscard]] Finding some_silence(const Observations& seen, std::size_t silent, std::size_t all);
 void judge_state(const Case& one, std::vector<Finding>& findings);
-void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
-                    std::vector<Finding>& findings);
+/// Adds findings about the positions to `result`, and names there what these positions could not show.
+void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand, Examination& result);
 
 /// Returns the beginning of the reply as text, as "1A 20 45".
 [[nodiscard]] std::string shown(const Attempted& one);

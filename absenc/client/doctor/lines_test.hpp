@@ -22,7 +22,8 @@ class ScriptedPort final : public Port<Item> {
  public:
   using List = std::vector<Item>;
   std::function<List(const List& request)> answer = [](const List&) { return List{}; };
-  List babble{};  // bytes or frames that another device sends every millisecond; empty: no other device
+  List babble{};  // bytes or frames that another device sends by itself; empty: no other device
+  Time babble_period = 1ms;
   Time after = 100us;
   Time latency{};
   bool destroys = false;  // whether a line error follows each request, as on a CAN bus without acknowledgement
@@ -54,7 +55,7 @@ class ScriptedPort final : public Port<Item> {
       return tell(current_.event, current_.items);
     }
     if (first == noise) {
-      babble_at_ = now_ + 1ms;
+      babble_at_ = now_ + babble_period;
       return tell({.kind = Event<Item>::Kind::received, .at = now_}, babble);
     }
     if (first == silence) {

@@ -56,11 +56,14 @@ struct Observations {
   // errors of characters that the UART counted during the examination; nothing: not known
   std::optional<os::LineCounts> damage{};
   std::optional<Refusal> refusal{};
-  // bytes that were received before the first request; only about the first 4096 are stored
+  // bytes that were received while nothing was requested; only about the first 4096 are stored
   std::vector<std::uint8_t> unsolicited{};
   Time listened{};
   // whether bytes were received in at least 4 of the 5 periods of listening before the first request
   bool never_silent = false;
+  // whether bytes were received in at least two of these periods that do not follow one another, or some time after the
+  // last reading
+  bool sends_unasked = false;
   std::vector<Attempted> readings{};
   // failed requests that the host repeated within a reading, so that the reading itself may be good
   std::vector<Attempted> repeated{};

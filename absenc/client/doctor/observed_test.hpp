@@ -48,16 +48,21 @@ inline Examination judged(const Observations& seen) {
   return judge(*address.unit, address.options, seen);
 }
 
+/// Sets valid turns of 16 bits in these readings.
+inline void set_turns(std::vector<Attempted>& readings, const std::function<std::int64_t(std::size_t)>& turns) {
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    Reading& reading = *readings[i].reading;
+    reading.multiturn = static_cast<std::uint64_t>(turns(i)) & low_mask(16);
+    reading.multiturn_bits = 16;
+    reading.multiturn_valid = true;
+  }
+}
+
 inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t)>& place,
                                    const std::function<std::int64_t(std::size_t)>& turns) {
   Observations seen = positions([](std::size_t) { return 5; });
   seen.turned = positions(place).readings;
-  for (std::size_t i = 0; i < seen.turned.size(); ++i) {
-    Reading& reading = *seen.turned[i].reading;
-    reading.multiturn = turns(i);
-    reading.multiturn_bits = 16;
-    reading.multiturn_valid = true;
-  }
+  set_turns(seen.turned, turns);
   return seen;
 }
 

@@ -25,7 +25,7 @@ std::string advice_of(FindingKind finding_kind, PortKind place) {
 
 TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   for (const PortKind place : {PortKind::tcp, PortKind::spi, PortKind::can, PortKind::sim}) {
-    for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::stuck_bits); ++i) {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::few_readings); ++i) {
       const auto finding_kind = static_cast<FindingKind>(i);
       const std::string_view id = id_of(finding_kind);
       if (of_serial_ports.contains(id)) continue;
@@ -40,8 +40,8 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
 }
 
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
-  for (const FindingKind finding_kind :
-       {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {
+  for (const FindingKind finding_kind : {FindingKind::reply_late, FindingKind::sometimes_late,
+                                         FindingKind::sometimes_silent, FindingKind::few_readings}) {
     EXPECT_THAT(advice_of(finding_kind, PortKind::serial), HasSubstr("latency="));
     EXPECT_THAT(advice_of(finding_kind, PortKind::tcp), HasSubstr("latency="));
     EXPECT_THAT(advice_of(finding_kind, PortKind::sim), Not(HasSubstr("latency=")));

@@ -3,6 +3,7 @@
 
 #include <fmt/args.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -63,8 +64,9 @@ constexpr auto table = std::to_array<Words>({
      "check the encoder's supply, CANH and CANL, 120 ohms at both ends, and the bit rate"},
 
     {FindingKind::never_silent, "never_silent", fault,
-     "{0} bytes arrived in {1} before anything was sent, without a pause, such as {2}",
-     "another host or an encoder that sends by itself uses the line, or the line is open and picks up noise",
+     "{0} bytes arrived in {1} while nothing was requested, {3}, such as {2}",
+     "another host or an encoder that sends by itself uses the line, so that its frames may pass for replies; or the "
+     "line is open and picks up noise",
      "disconnect other senders; set the mode in which the encoder sends by itself; bias the idle line"},
     {FindingKind::line_inverted, "line_inverted", fault, "the idle line is low: {0}",
      "A and B (or the two wires of a pair) are exchanged, so that every level is inverted",
@@ -219,8 +221,7 @@ constexpr auto table = std::to_array<Words>({
     {FindingKind::position_noise, "position_noise", warning, "at standstill the position varies by {0} counts ({1})",
      "the magnet or scale is too far or off centre, or the supply is noisy",
      "check air gap and centring, the supply at the encoder, and that nothing vibrates"},
-    {FindingKind::position_jumps, "position_jumps", fault,
-     "{0} times the position moved further than a shaft can turn, by up to {1} counts",
+    {FindingKind::position_jumps, "position_jumps", fault, "{0}",
      "a damaged track or magnet, or a fault of the encoder", "turn it slowly past this position; replace the encoder"},
     {FindingKind::position_frozen, "position_frozen", fault,
      "the position stayed within {0} counts in {1} readings over {2}, in which the shaft should have turned",
@@ -230,8 +231,18 @@ constexpr auto table = std::to_array<Words>({
      "the number of turns stayed at {0} while the position passed zero {1} times",
      "turns are not counted: no battery, a counter that is switched off, or a fault of the encoder",
      "check battery and alarms; reset the turns with the protocol's command (`absenc run`)"},
+    {FindingKind::turns_jump, "turns_jump", fault,
+     "{0} times turns and position together moved further than a shaft can turn, by up to {1}, though the position "
+     "within the turn did not",
+     "turns are counted wrongly: backwards, away from zero of the position, or at random",
+     "check battery and alarms; reset the turns with the protocol's command (`absenc run`); do not use turns that "
+     "jump"},
     {FindingKind::stuck_bits, "stuck_bits", fault, "{0} of the position never changed while it moved {1} counts",
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
+
+    {FindingKind::few_readings, "few_readings", warning, "only {0} in {1}, too few to call it good",
+     "each reading takes long: the encoder is slow, or absenc waits for the latency that it assumes for the way to it",
+     "take at least 10, as with --for 30; if the latency of the way is known, set latency=MS behind the encoder"},
 });
 
 /// Texts of a finding for one kind of port, which replace the texts in `table`; "": the text of `table` stays.
@@ -313,6 +324,12 @@ constexpr auto elsewhere = std::to_array<Elsewhere>({
     {FindingKind::modem_answers, PortKind::can, "another device than an encoder is on this bus",
      "name another interface"},
     {FindingKind::sometimes_silent, PortKind::spi, "", "check plugs, supply and wires"},
+    {FindingKind::few_readings, PortKind::spi, "the encoder needs long for each reading",
+     "take at least 10, as with --for 30"},
+    {FindingKind::few_readings, PortKind::ftdi, "the encoder needs long for each reading",
+     "take at least 10, as with --for 30"},
+    {FindingKind::few_readings, PortKind::sim, "the encoder needs long for each reading, or this computer is busy",
+     "take at least 10, as with --for 30"},
     {FindingKind::sometimes_silent, PortKind::sim, "the virtual encoder has such a fault, or this computer is busy",
      "leave the fault out, or reduce the load of the computer"},
 });
@@ -323,7 +340,7 @@ constexpr bool is_in_order() {
   }
   return true;
 }
-static_assert(is_in_order() && table.size() == static_cast<std::size_t>(FindingKind::stuck_bits) + 1);
+static_assert(is_in_order() && table.size() == static_cast<std::size_t>(FindingKind::few_readings) + 1);
 
 const Words& words_of(FindingKind finding_kind) { return table[static_cast<std::size_t>(finding_kind)]; }
 
@@ -402,7 +419,7 @@ std::string Examination::verdict() const {
   }
   if (!measured.echo.empty()) evidence += fmt::format("; {}", measured.echo);
   if (measured.latency) evidence += fmt::format("; latency of the port up to {}", to_text(*measured.latency));
-  if (!measured.turned) evidence += "; not looked at: a turning shaft (--turn)";
+  if (!not_looked_at.empty()) evidence += fmt::format("; not looked at: {}", fmt::join(not_looked_at, ", "));
   return evidence;
 }
 

@@ -101,7 +101,9 @@ constexpr std::array<Parameter, 9> doctor_parameters{{
     {"--for", "SECONDS", "how long it reads, as fast as it can", "3"},
     {"--readings", "N", "it ends after so many readings", "100000"},
     {"--turn", "SECONDS",
-     "then look on while you turn the shaft by hand: a position that stands, jumps, codes that are missing", "0"},
+     "then look on while you turn the shaft by hand: a position that stands, jumps, turns that do not fit it, missing "
+     "codes",
+     "0"},
     {"--report", "FILE.zip",
      "also write a report for those who correct absenc: versions, adapter, settings, findings, the last thousand "
      "exchanges; what it holds is shown first"},
@@ -128,9 +130,9 @@ const Subcommand doctor_subcommand{
     "A port without a protocol is identified first. Then looks from the port up: whether it is there, may be\n"
     "opened and is nobody else's; whether the line is silent until it is asked; whether anything answers, and if\n"
     "not, as another model, at another rate, SPI mode, clock or address, or in another protocol; what damaged replies\n"
-    "look like, and what adapters do to bytes; what the encoder reports; whether the position is quiet and goes no\n"
-    "faster than a shaft can. Each finding has what was seen, what is likely behind it and what to do. The last line\n"
-    "says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
+    "look like, and what adapters do to bytes; what the encoder reports; whether position and turns are quiet and go\n"
+    "no faster than a shaft can. Each finding has what was seen, what is likely behind it and what to do. The last\n"
+    "line says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
     "Exit status 1 when something is to be mended.",
     doctor_parameters,
     doctor_examples,
