@@ -132,7 +132,7 @@ TEST(DumpFile, NumbersAsPeopleWriteThem) {
 TEST(DumpFile, RefusesOtherFiles) {
   expect_refusal("", {"no dump"});
   expect_refusal("precious\n", {"no dump"});
-  expect_refusal("absenc dump 2\n", {"no dump", "absenc dump 1"});
+  expect_refusal("absenc dump 2\n", {"absenc dump 2", "absenc dump 1", "use a newer absenc"});
   expect_refusal("absenc memory 1\nprotocol: tformat\n", {"memory file of a virtual encoder", "emulate --memory"});
   expect_refusal(replaced(std::string(small), "protocol: tformat", "protocol: esl"),
                  {"line 2", "protocol: esl", "protocol: tformat"});
