@@ -146,7 +146,7 @@ struct Examination {
   Measured measured{};              ///< Times, rates and settings that were measured.
   /// Possible faults that the readings could not show, with the reason, as "a turning shaft (--turn)".
   std::vector<std::string> not_looked_at{};
-  bool complete = true;             ///< False if the diagnosis was interrupted.
+  bool complete = true;  ///< False if the diagnosis was interrupted.
 
   /// Returns whether the diagnosis is complete and no finding is a warning or a fault.
   [[nodiscard]] bool healthy() const;
