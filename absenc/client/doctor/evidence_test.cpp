@@ -3,6 +3,7 @@
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <random>
 #include <string>
@@ -162,6 +163,28 @@ TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   seen.readings[100].raw = seen.readings[100].exchange.reply.bytes;
   seen.readings[100].error = Error::bad_checksum;
   EXPECT_THAT(ids(judged(seen)), Not(IsEmpty()));
+}
+
+/// A checksum misses some damaged replies, which then look like replies to other requests.
+TEST(Doctor, OneReplyToAnotherRequestAmongManyDamagedBlamesNoRequest) {
+  for (const std::size_t damaged : {5U, 40U}) {
+    Observations seen = positions([](std::size_t) { return 5; });
+    const auto spoil = [&](std::size_t at, Error error, const ByteList& reply) {
+      seen.readings[at].error = error;
+      seen.readings[at].reading.reset();
+      seen.readings[at].raw = reply;
+      seen.readings[at].exchange.request.bytes = {0x1A};
+      seen.readings[at].exchange.reply.bytes = reply;
+    };
+    for (std::size_t i = 0; i < damaged; ++i) {
+      ByteList reply = good_reply();
+      reply[2 + i % 8] ^= static_cast<std::uint8_t>(1 << i % 7);
+      spoil(4 * i + 1, Error::bad_checksum, reply);
+    }
+    spoil(190, Error::unexpected_reply, {0x02, 0, 0, 0, 0, 0x02});
+    const std::vector<std::string> found = ids(judged(seen));
+    EXPECT_EQ(std::ranges::count(found, "requests_damaged"), damaged == 5 ? 1 : 0) << damaged;
+  }
 }
 
 /// Frames that waited in this computer are read all at once, so the speed of the shaft between them is unknown.
