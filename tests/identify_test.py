@@ -113,6 +113,14 @@ class IdentifyOnLine(EncoderCase):
         self.assertIn("\n1 says: encoder_id 0x17\n", result.stdout)
         self.assertRegex(result.stdout, r'go on with: absenc read "tformat:.*\?model=23-bit')
 
+    def test_says_which_other_devices_answer_alike(self):
+        for protocol, is_noted in (("raa38-modbus", True), ("tformat", False)):
+            with Emulator(self.directory, protocol=protocol, name=protocol) as emulator:
+                rate = "19200" if is_noted else "2500000"
+                result = absenc("identify", f"{emulator.path}?baud={rate}")
+                self.assert_good(result)
+                self.assertEqual("any Modbus device that has the same registers answers like this" in result.stderr, is_noted)
+
     def test_sends_no_changing_request(self):
         memory = self.file("memory")
         with Emulator(self.directory, "--memory", memory, "--alarm", "battery_alarm") as emulator:

@@ -287,7 +287,7 @@ class Failures(RecordCase):
         self.assertIn(f"{readings} readings and 0 failures", messages)
         self.assertIn("the port went away: 1", messages)
         good = int(re.search(r"exchanges: (\d+) good", messages)[1])
-        beside = re.search(r"; (\d+) of the good ones confirmed a position", messages)
+        beside = re.search(r"; (\d+) of the good exchanges gave no reading", messages)
         self.assertEqual(good, readings + (int(beside[1]) if beside else 0))
 
     def test_no_file_is_overwritten(self):

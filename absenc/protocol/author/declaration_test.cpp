@@ -97,6 +97,7 @@ constexpr Declaration<Toy, Encoder> smallest{
     .name = "toy",
     .document = "none",
     .known_as = known_as,
+    .lookalikes = "any other toy",
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = format_of<options>,
@@ -297,6 +298,7 @@ constexpr Declaration<Toy, Encoder> controlled = [] {
 TEST(Declaration, IsKnownByItsMakers) {
   ASSERT_EQ(unit.known_as.size(), 1u);
   EXPECT_EQ(unit.known_as.front(), "maker");
+  EXPECT_EQ(unit.lookalikes, "any other toy");
 }
 
 TEST(Declaration, SizesReplies) {
