@@ -19,7 +19,7 @@ TEST(Random, NumbersAreThePublishedOnes) {
 TEST(Random, BelowReachesEveryNumberEquallyOften) {
   Random random(1);
   std::array<int, 6> counts{};
-  for (int i = 0; i < 60'000; ++i) ++counts.at(random.below(6));
+  for (int i = 0; i < 60'000; ++i) ++counts.at(static_cast<std::size_t>(random.below(6)));
   for (const int count : counts) EXPECT_NEAR(count, 10'000, 400);
   EXPECT_EQ(random.below(1), 0u);
 }
