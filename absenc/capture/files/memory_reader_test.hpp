@@ -69,7 +69,7 @@ class MemoryReader final : public Reader {
     if (next_ >= wires_.ticks()) return false;
     block.index = index_++;
     block.first = next_;
-    std::size_t end = std::min(next_ + 1 + below(random_, most_), wires_.ticks());
+    auto end = static_cast<std::size_t>(std::min<std::uint64_t>(next_ + 1 + below(random_, most_), wires_.ticks()));
     if (next_ < hole_first_) end = std::min(end, hole_first_);
     block.end = next_ = end;
     return true;

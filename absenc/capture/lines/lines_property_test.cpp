@@ -213,7 +213,8 @@ RC_GTEST_PROP(LinesProperty, ClockedResultDoesNotDependOnThreadsAndBlocks, (std:
   const std::size_t ticks = clock.size();
   for (auto* data : {&in, &out}) {
     while (data->size() < ticks)
-      data->resize(std::min(ticks, data->size() + 1 + below(random, 3 * half)), random() % 2 == 0);
+      data->resize(std::min(ticks, data->size() + 1 + static_cast<std::size_t>(below(random, 3 * half))),
+                   random() % 2 == 0);
   }
   for (auto& levels : wires.levels) {
     for (std::uint64_t i = below(random, 3) == 0 ? below(random, 10) : 0; i > 0; --i) levels[below(random, ticks)] ^= 1;
