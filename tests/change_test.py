@@ -100,6 +100,7 @@ class Journal(Case):
         result = self.absenc("changes")
         self.assert_good(result)
         self.assertIn("no changes are in " + self.journal, result.stdout)
+        self.assertIn(f"no changes of elbow are in {self.journal}", self.absenc("changes", "elbow").stdout)
         # a change of a virtual encoder is not recorded in the journal
         self.assert_good(self.absenc("zero", "sim:tformat"))
         self.assertEqual(self.changes(), [])
@@ -141,10 +142,11 @@ class Journal(Case):
     def test_unknown_result_is_recorded(self):
         for seed in range(1, 60):
             with Emulator(self.directory, "--fault", "silence=0.3", "--seed", str(seed), name=f"line{seed}") as encoder:
-                json_result = json.loads(self.absenc("run", f"tformat:{encoder.path}", "memory-write", "5", str(seed), "--yes",
-                                              "--json").stdout)
+                address = f"tformat:{encoder.path}?latency=250"
+                json_result = json.loads(self.absenc("run", address, "memory-write", "5", str(seed), "--yes", "--json").stdout)
             if json_result["change"] == "unknown":
                 break
+        self.assertIn(f'`absenc memory read "{address}" 0x05` shows what is there now', json_result["change_advice"])
         self.assertEqual(self.changes()[-1]["change"], "unknown")
         self.assertEqual(self.changes()[-1]["after"], f"0x{seed:02X}")
 

@@ -355,6 +355,11 @@ class Usage(Case):
         self.assert_failed(absenc("decode", "tformat", self.file("missing")), "missing")
         self.assert_failed(absenc("decode", "tformat", self.file("empty", "")), "empty")
         self.assert_failed(absenc("decode", "tformat", self.file("what.bin", "\0\1\2\3")), "what.bin")
+        self.assert_failed(absenc("decode", "nothere.zip"), "nothere.zip does not exist")
+        # The first of two files is taken for the name of a protocol, but it does exist.
+        there = absenc("decode", self.file("a.txt", "1A\n"), self.file("b.txt", "1A\n"))
+        self.assertNotEqual(there.returncode, 0)
+        self.assertNotIn("does not exist", there.stderr)
 
 
 if __name__ == "__main__":

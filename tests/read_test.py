@@ -186,6 +186,10 @@ class ErrorMessages(EncoderCase):
         self.assertRegex(result.stderr, r"nothing came back within 100 us, plus \d+ ms for the adapter or network\n")
         self.assertEqual(result.stdout, "")
 
+    def test_hint_examines_the_same_encoder(self):
+        encoder = "sim:tformat?fault=silence=1&seed=2"
+        self.assertIn(f'`absenc doctor "{encoder}"` says more', absenc("read", encoder).stderr)
+
     def test_silence_as_json(self):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}", "--json", "--count", "2")
         self.assertEqual(result.returncode, 1)

@@ -30,7 +30,7 @@ struct Change {
   ChangeState state = ChangeState::none;  ///< Whether the encoder was changed, as far as it is known.
   /// Advice for the user; "": none.
   std::string advice{};
-  /// What the change did besides, why its result is unknown, or why the journal has no entry of it; "": nothing.
+  /// A side effect of the change, the reason for an unknown result, or why the journal has no entry; "": none.
   std::string note{};
 
   /// Returns state, advice and note as text, "sent, result unknown: ADVICE; NOTE"; "" for `none`.

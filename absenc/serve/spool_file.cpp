@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
+#include "absenc/core/hash.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/file_name.hpp"
 #include "absenc/serve/fields.hpp"
@@ -25,11 +26,10 @@ constexpr char is_waiting = 'w', has_arrived = 'a';
 
 // Returns the checksum of a record: FNV-1a over its kind and body.
 std::uint32_t checksum(char kind, std::string_view body) {
-  std::uint32_t hash = 2166136261U;
-  const auto take = [&](char one) { hash = (hash ^ static_cast<unsigned char>(one)) * 16777619U; };
-  take(kind);
-  for (const char one : body) take(one);
-  return hash;
+  const auto bytes_of = [](std::string_view text) {
+    return Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+  };
+  return fnv1a(bytes_of(body), fnv1a(bytes_of({&kind, 1})));
 }
 
 std::string record(char kind, const std::string& body) {

@@ -7,171 +7,21 @@
 #include <array>
 #include <cstdio>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "absenc/client/conform/changed_encoder_test.hpp"
 #include "absenc/client/conform/mutant_test.hpp"
 #include "absenc/client/error.hpp"
-#include "absenc/client/row.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/host/session.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/protocol/all.hpp"
-#include "absenc/sim/rough_line.hpp"
 #include "tests/cases.hpp"
 
 namespace absenc::client {
 namespace {
-
-using ByteList = std::vector<std::uint8_t>;
-
-/// An encoder that ignores some requests, damages some replies or corrupts some writes.
-template <class Item>
-class Disobedient final : public Machine<Item> {
- public:
-  using Kind = typename Event<Item>::Kind;
-
-  explicit Disobedient(const VirtualDevice& device)
-      : line_(machine_of<Item>(device)), device_(*device.device().template of<Item>()) {}
-
-  void feed(const Event<Item>& event) override {
-    // On a clocked link a request has no bytes, so each start of the clock counts as a request.
-    if (event.kind == Kind::received || event.kind == Kind::selected) {
-      ++requests;
-      const bool is_ignored_now = requests >= ignored_from && requests < ignored_until;
-      const bool is_ignored_request =
-          !ignored_request.empty() &&
-          std::equal(event.items.begin(), event.items.end(), ignored_request.begin(), ignored_request.end());
-      if (is_ignored_now || (is_ignored_request && obeyed_++ >= obeyed_times)) return;
-    }
-    const ByteList before = memory();
-    line_.feed(event);
-    look(before);
-  }
-  Step<Item> next(Time now) override {
-    const ByteList before = memory();
-    Step<Item> step = line_.next(now);
-    look(before);
-    const bool is_damaged = damaged_at != 0 && requests == damaged_at;
-    if (step.kind != Step<Item>::Kind::transfer || !is_damaged || step.out.empty()) return step;
-    reply_.assign(step.out.begin(), step.out.end());
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      reply_.back().data[0] ^= 1;
-    } else {
-      reply_.back() ^= 1;
-    }
-    step.out = reply_;
-    return step;
-  }
-
-  std::vector<Item> ignored_request{};  // request that the encoder ignores; empty: none
-  unsigned obeyed_times = 0;            // number of times that the encoder obeys `ignored_request` before it ignores it
-  // number, from 1, of the first request that the encoder ignores; 0 together with `ignored_until` 0: it ignores none
-  unsigned ignored_from = 0;
-  unsigned ignored_until = 0;  // number of the first request that the encoder does not ignore any more
-  // number of the request whose reply gets a wrong bit; 0: no reply does
-  unsigned damaged_at = 0;
-  unsigned change = 0;      // number, from 1, of the memory change that `spoil` corrupts; 0: no change is corrupted
-  bool spoils_all = false;  // whether `spoil` corrupts each change of the memory
-  // corrupts the memory, given its new content and its previous content
-  std::function<void(MutableBytes, const ByteList&)> spoil{};
-  unsigned requests = 0;
-
- private:
-  [[nodiscard]] ByteList memory() const { return {device_.memory().begin(), device_.memory().end()}; }
-  void look(const ByteList& before) {
-    if (std::equal(before.begin(), before.end(), device_.memory().begin())) return;
-    if (++changes_ != change && !spoils_all) return;
-    spoil(device_.memory(), before);
-  }
-
-  Machine<Item>& line_;
-  Device<Item>& device_;
-  unsigned changes_ = 0;
-  unsigned obeyed_ = 0;
-  std::vector<Item> reply_;
-};
-
-/// A port that calls `end` in its wait number `at`, counted from 1; if `lost` is set, the line is lost after that.
-template <class Item>
-class EndingPort final : public Port<Item> {
- public:
-  explicit EndingPort(Port<Item>& port) : port_(port) {}
-  Time now() override { return port_.now(); }
-  void begin(const Step<Item>& step) override { port_.begin(step); }
-  Event<Item> wait(const Step<Item>& step) override {
-    if (++steps == at && end) end();
-    if (lost && steps >= at) throw os::Failure(os::Failure::Kind::lost, "the line is lost");
-    return port_.wait(step);
-  }
-
-  unsigned steps = 0;
-  unsigned at = 0;
-  bool lost = false;
-  std::function<void()> end{};
-
- private:
-  Port<Item>& port_;
-};
-
-template <class Item>
-struct Bench {
-  explicit Bench(const EncoderAddress& where) : address(where) {
-    link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
-    link.device->power_on(Time{});
-    device = link.device->device().template of<Item>();
-    mutant = std::make_unique<Disobedient<Item>>(*link.device);
-    line = std::make_unique<sim::RoughLine<Item>>(address.unit->link, address.line.with_some_rate(), *mutant, 1);
-    port = std::make_unique<EndingPort<Item>>(*line);
-  }
-  [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
-  /// Returns position and settings as text. The memory is left out, because an encoder may count its writes in it.
-  [[nodiscard]] std::string settings() const {
-    // Sets the port to the baud rate of the address and waits for 2 s: the conformance test may have ended while the
-    // line had another baud rate, or just after a restart of the encoder.
-    line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
-    const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
-    while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
-    }
-    std::string text;
-    const auto add_value = [&](const Command& command, std::string_view field) {
-      std::vector<std::byte> storage(address.unit->host_storage);
-      host::Session<Item> session(*address.unit, address.options, *line, storage);
-      const Conversation<Item>* ended = session.run(command);
-      AnswerSink sink;
-      ended->report(sink);
-      EXPECT_EQ(ended->error(), Error::none) << command.name << " of an encoder that conform has left";
-      if (ended->error() != Error::none) return;
-      text += fmt::format("{} {}\n", command.name, to_text(sink.answer[field]));
-    };
-    for (const Clause& clause : clauses_of(*address.unit)) {
-      if (!clause.field.empty()) add_value(*find_command(*address.unit, clause.setting), clause.field);
-    }
-    const auto position = std::ranges::find(address.unit->fields, Role::position, &FieldInfo::role);
-    if (position != address.unit->fields.end()) add_value(*find_command(*address.unit, Verb::read), position->name);
-    return text;
-  }
-  // Runs the conformance test on a link that does not own `device`, because `device` is inspected after the test.
-  [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
-    Link port_link;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      port_link.frames = port.get();
-    } else {
-      port_link.bytes = port.get();
-    }
-    return conform(address, std::move(port_link), {.readings = 3, .changes = true, .resets = resets, .over = over},
-                   "NAME");
-  }
-
-  EncoderAddress address;
-  Link link;
-  Device<Item>* device = nullptr;
-  std::unique_ptr<Disobedient<Item>> mutant;
-  std::unique_ptr<sim::RoughLine<Item>> line;
-  std::unique_ptr<EndingPort<Item>> port;
-};
 
 std::vector<const Clause*> changing(const Unit& unit) {
   std::vector<const Clause*> clauses;
@@ -289,7 +139,7 @@ void check_mutants(const Unit& unit) {
   std::size_t tried = 0;
   for (const Clause* const clause : changing(unit)) {
     const EncoderAddress address = address_showing_change(unit, *clause);
-    const Bench<Item> good(address);
+    const ChangedEncoder<Item> good(address);
     const Conformance original = good.run(true);
     EXPECT_EQ(verdict_of(original, clause->id), Verdict::kept) << clause->id << "\n" << original.report();
     EXPECT_EQ(with_verdict(original, Verdict::broken), std::vector<std::string>{}) << original.report();
@@ -298,7 +148,7 @@ void check_mutants(const Unit& unit) {
     std::string last;
     for (const Spoil<Item>& spoil : spoils_of<Item>(address, *clause, good.memory().size(), good.mutant->requests)) {
       ++tried;
-      const Bench<Item> bench(address);
+      const ChangedEncoder<Item> bench(address);
       spoil(*bench.mutant);
       const Conformance mutant = bench.run(true);
       last = mutant.report();
@@ -315,7 +165,7 @@ void check_mutants(const Unit& unit) {
 
 template <class Item>
 void check_ends(const EncoderAddress& address) {
-  const Bench<Item> whole(address);
+  const ChangedEncoder<Item> whole(address);
   const ByteList before = whole.memory();
   const Conformance original = whole.run();
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
@@ -330,7 +180,7 @@ void check_ends(const EncoderAddress& address) {
   for (unsigned i = 0; i < steps * kinds; i += stride) {
     const unsigned at = 1 + i / kinds;
     const unsigned kind = i % 3;
-    const Bench<Item> bench(address);
+    const ChangedEncoder<Item> bench(address);
     bench.port->at = at;
     bool over = false;
     bench.port->end = [&] {
@@ -388,12 +238,12 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
 
 TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   const EncoderAddress address = parse_address("sim:tformat");
-  const Bench<std::uint8_t> whole(address);
+  const ChangedEncoder<std::uint8_t> whole(address);
   const ByteList before = whole.memory();
   ASSERT_EQ(whole.run().verdict(), Verdict::kept);
   unsigned changed = 0;
   for (unsigned at = 1; at <= whole.port->steps; ++at) {
-    const Bench<std::uint8_t> bench(address);
+    const ChangedEncoder<std::uint8_t> bench(address);
     bench.port->at = at;
     bench.port->lost = true;
     std::string words;
@@ -411,59 +261,6 @@ TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   EXPECT_GT(changed, 4U);
 }
 
-// Result of a zero: its error, and what the session knows of the change.
-struct Zeroed {
-  Error error;
-  ChangeSent change;
-  std::string note;
-};
-
-// Sets the zero of an encoder at the position `counts`. `is_ignored`: the encoder replies, but stores nothing.
-template <class Item>
-Zeroed zero_at(const Unit& unit, std::uint64_t counts, bool is_ignored) {
-  const Bench<Item> bench(parse_address(fmt::format("sim:{}?singleturn={}", unit.id, counts)));
-  const Command& zero = *find_command(unit, Verb::zero);
-  if (is_ignored) {
-    bench.mutant->spoils_all = true;
-    bench.mutant->spoil = [](MutableBytes now, const ByteList& before) {
-      std::copy(before.begin(), before.end(), now.begin());
-    };
-  }
-  std::vector<std::byte> storage(unit.host_storage);
-  host::Session<Item> session(unit, bench.address.options, *bench.line, storage);
-  const Conversation<Item>* const ended = session.run(zero, complete_arguments(zero, {}));
-  return {ended->error(), session.change_sent(), std::string(session.change_note())};
-}
-
-// An encoder that ignores the zero, and stands so near to it that the position read back is right nevertheless.
-TEST(Zero, IsNotConfirmedIfItCouldHaveBeenIgnored) {
-  unsigned unproven = 0;
-  for (const Unit* const unit : all_units()) {
-    if (find_command(*unit, Verb::zero) == nullptr) continue;
-    const EncoderAddress address = parse_address(fmt::format("sim:{}", unit->id));
-    const std::uint64_t turn = std::uint64_t{1} << unit->resolution(address.options).singleturn_bits;
-    const auto at = [&](std::uint64_t counts, bool is_ignored) {
-      return unit->link == LinkKind::can ? zero_at<CanFrame>(*unit, counts, is_ignored)
-                                         : zero_at<std::uint8_t>(*unit, counts, is_ignored);
-    };
-    if (at(turn / 3, false).error == Error::unsupported) continue;
-    const Zeroed obeyed = at(turn / 3, false);
-    EXPECT_EQ(obeyed.error, Error::none) << unit->id;
-    EXPECT_EQ(obeyed.change, ChangeSent::yes) << unit->id;
-    EXPECT_EQ(obeyed.note, "") << unit->id;
-    const Zeroed ignored = at(turn / 3, true);
-    if (ignored.error == Error::none) continue;  // this virtual encoder has its zero not only in its memory
-    EXPECT_EQ(ignored.change, ChangeSent::refused) << unit->id;
-    const Zeroed near = at(std::max<std::uint64_t>(turn >> 15, 1), true);
-    EXPECT_TRUE(near.error != Error::none || near.change != ChangeSent::yes) << unit->id;
-    if (near.change == ChangeSent::unproven) {
-      ++unproven;
-      EXPECT_NE(near.note.find("turn the shaft and try again"), std::string::npos) << unit->id << ": " << near.note;
-    }
-  }
-  EXPECT_GE(unproven, 5U);
-}
-
 // Each byte beside the written one is compared, before and behind it, as far as its area of the memory reaches.
 TEST(Conformance, ByteBesideIsComparedOnBothSides) {
   struct Case {
@@ -475,14 +272,14 @@ TEST(Conformance, ByteBesideIsComparedOnBothSides) {
   for (const Case& one : {Case{"sim:hiperface?model=SKM36", "data-beside", "page 0: 0x7A to 0x7D, 0x7F", 1},
                           Case{"sim:tformat", "eeprom-beside", "page 0: 0x7A to 0x7D", 0}}) {
     const EncoderAddress address = parse_address(one.text);
-    const Conformance good = Bench<std::uint8_t>(address).run();
+    const Conformance good = ChangedEncoder<std::uint8_t>(address).run();
     EXPECT_EQ(verdict_of(good, one.clause), Verdict::kept) << good.report();
     EXPECT_NE(good.report().find(fmt::format("({})", one.compared)), std::string::npos) << good.report();
     for (int by = -4; by <= one.to; ++by) {
       if (by == 0) continue;
       bool broken = false;
       for (unsigned change = 1; change <= 12 && !broken; ++change) {
-        const Bench<std::uint8_t> bench(address);
+        const ChangedEncoder<std::uint8_t> bench(address);
         bench.mutant->change = change;
         bench.mutant->spoil = [by](MutableBytes now, const ByteList& before) {
           const auto written = std::mismatch(before.begin(), before.end(), now.begin()).second;
@@ -496,7 +293,7 @@ TEST(Conformance, ByteBesideIsComparedOnBothSides) {
 }
 
 TEST(Conformance, EvidenceSaysHowPositionsAreCompared) {
-  const Bench<std::uint8_t> bench(parse_address("sim:tformat?singleturn=50000&multiturn=7"));
+  const ChangedEncoder<std::uint8_t> bench(parse_address("sim:tformat?singleturn=50000&multiturn=7"));
   const Conformance found = bench.run(true);
   for (const char* const id : {"zero", "reset-multiturn"}) {
     const auto clause = std::ranges::find(found.clauses, id, &ClauseResult::id);
@@ -508,7 +305,7 @@ TEST(Conformance, EvidenceSaysHowPositionsAreCompared) {
 
 TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {
   const auto found = [](std::string_view text, bool resets) {
-    const Bench<std::uint8_t> bench(parse_address(text));
+    const ChangedEncoder<std::uint8_t> bench(parse_address(text));
     const Conformance conformance = bench.run(resets);
     std::array<Verdict, 3> verdicts{};
     std::ranges::transform(std::array{"zero", "clear-alarms", "reset-multiturn"}, verdicts.begin(),

@@ -313,8 +313,8 @@ void judge_position(const Case& one, const std::vector<Attempted>& readings, boo
     return;
   }
   host::SpeedLimit limit = one.seen.limit;
-  if (by_hand) limit.rpm = std::min(limit.rpm, hand_rpm);
   if (by_hand) {
+    limit.rpm = std::min(limit.rpm, hand_rpm);
     judge_frozen(walk, findings);
   } else {
     judge_noise(walk, findings);

@@ -36,13 +36,13 @@ std::string new_way(const EncoderAddress& before, const Command& command, Argume
 // Returns the advice that explains how to find out whether an encoder was changed.
 std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
   const Unit& unit = *before.unit;
-  const std::string address = address_of(before);
   if (!command.changes_option.empty()) {
     const Options behind = options_behind(unit, before.options, command, arguments.front());
     return fmt::format("try `absenc read {0}` with {1}, then with {2} as before, and only if neither answers search",
-                       address, option_text(unit, behind, command.changes_option),
+                       address_of(before), option_text(unit, behind, command.changes_option),
                        option_text(unit, before.options, command.changes_option));
   }
+  const std::string address = shell_text(before.written);
   if (!command.reads_back.empty()) {
     return fmt::format("`absenc config get {} {}` shows what it is now", address, command.reads_back);
   }

@@ -435,6 +435,10 @@ host::SpeedLimit speed_limit(const EncoderAddress& uri) {
   return limit;
 }
 
+std::string shell_text(std::string_view address) {
+  return address.find('?') == std::string_view::npos ? std::string(address) : fmt::format("\"{}\"", address);
+}
+
 std::string address_of(const EncoderAddress& uri) {
   if (uri.port_kind == PortKind::sim) return fmt::format("sim:{}", uri.unit->id);
   if (uri.port_kind == PortKind::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);

@@ -142,6 +142,9 @@ class NamedEncoders;
 /// Returns the address that absenc.toml gives to the encoder of this name; `names` is the content of absenc.toml.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
+/// Returns an address for a command that a shell executes: in quotes if it has settings, for their ? and &.
+[[nodiscard]] std::string shell_text(std::string_view address);
+
 /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
 [[nodiscard]] std::string address_of(const EncoderAddress& uri);
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "absenc/core/hash.hpp"
 #include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
@@ -23,17 +24,6 @@ struct Nodes {
 
 /// Value of `request_to_all` in `scan` for protocols in which no address reaches every encoder.
 struct NoneReachesAll {};
-
-namespace detail {
-
-/// Returns a hash of the bytes (FNV-1a).
-[[nodiscard]] constexpr std::uint32_t hash_of(Bytes bytes) {
-  std::uint32_t hash = 0x811C'9DC5;
-  for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x0100'0193;
-  return hash;
-}
-
-}  // namespace detail
 
 /// Sends the request `request_to(i)` to each address i, and stores in `nodes` which addresses answered. An address that
 /// is not silent is requested twice, because one answer may be noise. Errors: timeout (no answer at any address, or
@@ -59,7 +49,7 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   for (std::size_t i = 0; i < addresses; ++i) {
     const Result<typename P::Reply> first = co_await dialog.attempt(request_to(i)).once();
     if (dialog.is_noisy()) co_return {first.error()};
-    const std::uint32_t hash = detail::hash_of(dialog.exchange().received);
+    const std::uint32_t hash = fnv1a(dialog.exchange().received);
     if (i == 0) first_hash = hash;
     same += first && hash == first_hash ? 1 : 0;
     if (!first && first.error() == Error::timeout) {
@@ -82,7 +72,8 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
     }
   }
   if (same == addresses) {
-    co_return {Error::wrong_length, "every address gets the same reply: a device that ignores the address"};
+    co_return {Error::wrong_length, "every address gets the same reply: a device that ignores the address",
+               "disconnect it, or read it with the address that it should have"};
   }
   if (!any) co_return {Error::timeout, "no address was answered at this rate"};
   co_return done;

@@ -27,12 +27,15 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return std::max<std::int64_t>(static_cast<std::int64_t>(counts), 1);
 }
 
+/// Returns whether two positions of `bits` bits (1 to 63) differ by at most `most` counts.
+[[nodiscard]] constexpr bool is_within(std::uint64_t counts, std::uint64_t other, unsigned bits, std::int64_t most) {
+  const std::int64_t apart = wrapped_difference(counts, other, bits);
+  return apart <= most && -apart <= most;
+}
 /// Returns whether two positions of `bits` bits (1 to 63) differ by at most `millidegrees`, or by one count.
 [[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
                                      std::uint32_t millidegrees = standstill_millidegrees) {
-  const std::int64_t apart = wrapped_difference(counts, other, bits);
-  const std::int64_t limit = counts_of_angle(bits, millidegrees);
-  return apart <= limit && -apart <= limit;
+  return is_within(counts, other, bits, counts_of_angle(bits, millidegrees));
 }
 
 /// Notes in `routine` what the position `now` shows of a request that was to make it `wanted`. `before`: the position
@@ -40,15 +43,12 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
 /// the wanted one; `still`: the same for an unchanged position.
 inline void note_placed(Routine& routine, std::uint64_t before, std::uint64_t now, std::uint64_t wanted, unsigned bits,
                         std::int64_t limit, std::int64_t still) {
-  const auto are_near = [bits](std::uint64_t one, std::uint64_t other, std::int64_t most) {
-    const std::int64_t apart = wrapped_difference(one, other, bits);
-    return apart <= most && -apart <= most;
-  };
-  if (are_near(now, wanted, limit) && are_near(before, wanted, limit)) {
+  const bool is_there = is_within(now, wanted, bits, limit);
+  if (is_there && is_within(before, wanted, bits, limit)) {
     routine.unproven(
         "the position was already there before, to within the tolerance of the check (0.35 degrees at most), so it "
         "cannot show whether the encoder obeyed: turn the shaft and try again");
-  } else if (!are_near(now, wanted, limit) && are_near(now, before, still)) {
+  } else if (!is_there && is_within(now, before, bits, still)) {
     routine.refused();
   }
 }

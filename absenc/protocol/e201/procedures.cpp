@@ -126,15 +126,15 @@ Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
   }
   co_await dialog.ask({letter::zero}).changes();
   const Reply now = co_await dialog.ask({letter::decimal});
-  if (is_near(dialog, now.number, 0) && is_near(dialog, second.number, 0)) {
-    dialog.unproven(
-        "the position was zero before already, so it cannot show whether the zero was set: turn the shaft "
-        "and try again");
-  }
   if (!is_near(dialog, now.number, 0)) {
     if (is_near(dialog, now.number, second.number)) dialog.refused();
     co_return {Error::cross_check_failed, "the position is not zero afterwards",
                "hold the shaft still, then `absenc run ... set-zero` again"};
+  }
+  if (is_near(dialog, second.number, 0)) {
+    dialog.unproven(
+        "the position was zero before already, so it cannot show whether the zero was set: turn the shaft "
+        "and try again");
   }
   found.counts = now.number;
   co_return done;

@@ -127,11 +127,12 @@ Part<bool> store_position(Dialog& dialog, ProcedureResult& found, const Reading&
   if (!stored) co_await dialog.rest(store_limit);
   const Reading now = co_await look(dialog, found);
   const Format& format = dialog.format();
-  const std::int64_t apart = wrapped_difference(whole_position(format, now), position, format.position_bits());
-  const std::int64_t limit = counts_of_angle(format.resolution().singleturn_bits, zero_millidegrees);
-  note_placed(dialog, whole_position(format, before), whole_position(format, now), position, format.position_bits(),
-              limit, counts_of_angle(format.resolution().singleturn_bits));
-  if (apart > limit || -apart > limit) {
+  const unsigned turn_bits = format.resolution().singleturn_bits;
+  const std::int64_t limit = counts_of_angle(turn_bits, zero_millidegrees);
+  const std::uint64_t placed = whole_position(format, now);
+  note_placed(dialog, whole_position(format, before), placed, position, format.position_bits(), limit,
+              counts_of_angle(turn_bits));
+  if (!is_within(placed, position, format.position_bits(), limit)) {
     co_await dialog.stop({Error::cross_check_failed, "the position is another one than was set",
                           "hold the shaft still, then try again"});
   }

@@ -60,9 +60,7 @@ Json to_json(const Trouble& trouble) {
 }
 
 std::string finding_line(const Trouble& trouble, const EncoderAddress& address) {
-  // the shell would take ? and & for its own
-  const std::string_view quote = address.written.find('?') != std::string::npos ? "\"" : "";
-  return fmt::format("Looks like {}; `absenc doctor {}{}{}` says more", trouble.finding, quote, address.written, quote);
+  return fmt::format("Looks like {}; `absenc doctor {}` says more", trouble.finding, shell_text(address.written));
 }
 
 Json errors_to_json(const host::Counters& counters) {

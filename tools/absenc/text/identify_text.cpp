@@ -150,9 +150,7 @@ std::string advice_for(const LineFindings& findings, const LineSearch& search) {
 }
 
 std::string read_command(const Candidate& candidate, std::string_view place) {
-  const std::string address = address_of(candidate, place);
-  const std::string_view quote = address.find('?') == std::string::npos ? "" : "\"";
-  return fmt::format("absenc read {1}{0}{1}", address, quote);
+  return fmt::format("absenc read {}", shell_text(address_of(candidate, place)));
 }
 
 std::string decode_command(const Candidate& candidate) {

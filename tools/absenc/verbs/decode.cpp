@@ -181,7 +181,8 @@ int run_decode(const Invocation& invocation) {
   if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(os::path_of(first), error)) {
     return identify_instead(first);
   }
-  if (find_unit(first) == nullptr && first.find_first_of("./\\") != std::string_view::npos) {
+  const bool is_path = first.find_first_of("./\\") != std::string_view::npos;
+  if (is_path && find_unit(first) == nullptr && !std::filesystem::exists(os::path_of(first), error)) {
     throw Failure(fmt::format(
         "{} does not exist: name the file of a capture, or of a report of `absenc doctor --report`", first));
   }

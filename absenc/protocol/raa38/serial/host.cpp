@@ -230,18 +230,20 @@ Procedure set_zero(Dialog& dialog, Values& found) {
   // The encoder does not confirm zero clearing, so the position is polled.
   const Time deadline = dialog.received_at() + zero_limit;
   Result<Position> now = Error::timeout;
+  bool is_zero = false;
   do {
     co_await dialog.rest(zero_poll);
     now = co_await read_next_position(dialog);
     found = values_of(format, *now);
     found.before = second->singleturn;
-    if (now) note_zero(dialog, second->singleturn, now->singleturn, format.bits);
-    if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
-  } while (dialog.received_at() < deadline);
+    is_zero = now && is_near(now->singleturn, 0, format.bits, zero_millidegrees);
+  } while (!is_zero && dialog.received_at() < deadline);
   if (!now) {
     co_return only(now.error(), "the zero was set, but the position could not be read back",
                    "read the encoder to see what it is now");
   }
+  note_zero(dialog, second->singleturn, now->singleturn, format.bits);
+  if (is_zero) co_return done;
   co_return only(Error::cross_check_failed, "the position is not zero after the zero was set",
                  "let the shaft stand still; check the wire to CLR (below 0.5 V), or zero_unit, and that the encoder "
                  "has it");
