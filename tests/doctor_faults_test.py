@@ -148,9 +148,11 @@ class DoctorFaults(Case):
         with Emulator(self.directory, *(["--model", actual] if actual else []), "--motion", "rpm=20", protocol=unit,
                       name=f"{unit}-{actual}-{said}") as emulator:
             found = self.examine(f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={said}" if said else ""))
-            # Doctor may report stuck_bits: the encoder has fewer bits than the model in the address, and always sends
-            # zeros in their place.
-            self.assert_first(found, "wrong_settings good stuck_bits", f"{unit}: {actual} read as {said}")
+            # Doctor may report stuck_bits or turns_stand: the encoder has fewer bits than the model in the address, or
+            # no turns, and always sends zeros in their place.
+            self.assert_first(found, "wrong_settings good stuck_bits turns_stand", f"{unit}: {actual} read as {said}")
+            if "turns_stand" in (finding := {one["id"]: one for one in found["findings"]}):
+                self.assertIn("single-turn", finding["turns_stand"]["advice"])
             return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
 
     def test_another_address(self):

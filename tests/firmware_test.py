@@ -192,7 +192,9 @@ class Encoder(unittest.TestCase):
         # The host's timeout is set longer than the silence that ends an invalid request.
         process, encoder = self.start("m0plus", 0, LATENCY // 5, 8 * LATENCY)
         output = self.run_well("conform", encoder)
-        self.assertRegex(output, r"\b[1-9]\d* kept, 0 broken, 1 untested")
+        self.assertRegex(output, r"\b[1-9]\d* kept, 0 broken, 2 untested")
+        # An emulated machine takes longer than the 3 us of the document, as does the way to it.
+        self.assertRegex(output, r"untested: answer-time: ")
         self.assertRegex(output, r"untested: bad-delimiter: (.*\n){2} *this kind of port cannot change to")
         end(process)
 

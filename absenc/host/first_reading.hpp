@@ -41,9 +41,9 @@ class FirstReading {
 
   /// A position in counts, which includes the turns if they are valid and both fit in 64 bits.
   struct Place {
-    std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  ///< number of bits of `counts`; 0: there is no position
-    std::uint8_t singleturn_bits = 0;
+    std::uint64_t counts = 0;          ///< turns, if included, above the position within the turn
+    std::uint8_t bits = 0;             ///< number of bits of `counts`; 0: there is no position
+    std::uint8_t singleturn_bits = 0;  ///< those of them that are the position within the turn
 
     /// Returns whether `counts` includes the turns.
     [[nodiscard]] constexpr bool has_turns() const { return bits > singleturn_bits; }

@@ -229,8 +229,10 @@ constexpr auto table = std::to_array<Words>({
      "turn the shaft by more than a degree; check coupling, magnet and gap"},
     {FindingKind::turns_stand, "turns_stand", fault,
      "the number of turns stayed at {0} while the position passed zero {1} times",
-     "turns are not counted: no battery, a counter that is switched off, or a fault of the encoder",
-     "check battery and alarms; reset the turns with the protocol's command (`absenc run`)"},
+     "turns are not counted: a single-turn encoder, no battery, a counter that is switched off, or a fault of the "
+     "encoder",
+     "select its model if it is a single-turn encoder; otherwise check battery and alarms, and reset the turns with the "
+     "protocol's command (`absenc run`)"},
     {FindingKind::turns_jump, "turns_jump", fault,
      "{0} times turns and position together moved further than a shaft can turn, by up to {1}, though the position "
      "within the turn did not",
