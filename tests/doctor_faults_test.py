@@ -152,7 +152,7 @@ class DoctorFaults(Case):
             # no turns, and always sends zeros in their place.
             self.assert_first(found, "wrong_settings good stuck_bits turns_stand", f"{unit}: {actual} read as {said}")
             if "turns_stand" in (finding := {one["id"]: one for one in found["findings"]}):
-                self.assertIn("single-turn", finding["turns_stand"]["advice"])
+                self.assertIn("single-turn", finding["turns_stand"]["action"])
             return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
 
     def test_another_address(self):

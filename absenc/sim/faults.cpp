@@ -17,7 +17,7 @@ FaultRate parse_fault(std::string_view text) {
   if (found == fault_names.end()) {
     std::string known;
     for (const std::string_view kind : fault_names) known += (known.empty() ? "" : ", ") + std::string(kind);
-    throw std::invalid_argument(quoted + "unknown kind; known are " + known);
+    throw std::invalid_argument(quoted + "unknown kind; known are " + known + "; for example `drop=0.01`");
   }
   const std::string_view value = equals == std::string_view::npos ? std::string_view{} : text.substr(equals + 1);
   double rate = -1;

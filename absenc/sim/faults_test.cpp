@@ -319,7 +319,7 @@ TEST(ParseFault, ErrorNamesTheProblem) {
   };
   EXPECT_EQ(refusal("gremlins=0.1"),
             "fault `gremlins=0.1`: unknown kind; known are drop, corrupt, truncate, delay, echo, garbage, silence, "
-            "repeat, request_corrupt");
+            "repeat, request_corrupt; for example `drop=0.01`");
   for (const char* text : {"drop", "drop=", "drop=1.5", "drop=-0.1", "drop=nan", "drop=0.1x"}) {
     EXPECT_EQ(refusal(text),
               "fault `" + std::string(text) + "`: the rate must be a number from 0 to 1, for example `drop=0.01`");
