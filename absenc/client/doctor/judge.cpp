@@ -319,14 +319,14 @@ Measured measured_of(const Unit& unit, const Observations& seen, std::size_t goo
 Reported reported_by(const Unit& unit, const Observations& seen) {
   Reported reported;
   const std::size_t all = alarm_names(unit, ~0u).size();
-  // Without any alarm and status no reply reports that a position is invalid, so none reports that it is valid.
-  const bool reports_validity = unit.alarms != nullptr || unit.status != nullptr;
   std::uint32_t ever = 0;
   for (const Attempted& attempt : seen.readings) {
     if (!attempt.reading) continue;
     const std::uint32_t mask = attempt.reading->alarms_reported;
     ever |= mask;
     if (all != 0 && alarm_names(unit, mask).size() == all) ++reported.alarms;
+    // A reply without any alarm or status cannot report an invalid position, so it does not report a valid one either.
+    const bool reports_validity = (mask | attempt.reading->status_reported) != 0;
     if (reports_validity && attempt.reading->singleturn_validity() == Validity::valid) ++reported.valid;
   }
   for (const std::string_view name : alarm_names(unit, ~ever)) {

@@ -219,7 +219,7 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
     const std::string verdict = one.examination.verdict();
     EXPECT_NE(verdict.find(fmt::format("{} of {} readings", readings, readings)), std::string::npos) << verdict;
     const std::optional<Reading> reading = reading_of(address_of(unit(), mode, "")).reading;
-    const bool is_reported = unit().alarms != nullptr || unit().status != nullptr;
+    const bool is_reported = (reading->alarms_reported | reading->status_reported) != 0;
     const bool is_valid = is_reported && reading->singleturn_validity() == Validity::valid;
     EXPECT_EQ(verdict.find("each with a valid position") != std::string::npos, is_valid) << verdict;
     if (reading->alarms_reported == 0) {

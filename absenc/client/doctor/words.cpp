@@ -231,7 +231,8 @@ constexpr auto table = std::to_array<Words>({
      "the number of turns stayed at {0} while the position passed zero {1} times",
      "turns are not counted: a single-turn encoder, no battery, a counter that is switched off, or a fault of the "
      "encoder",
-     "select its model if it is a single-turn encoder; otherwise check battery and alarms, and reset the turns with the "
+     "select its model if it is a single-turn encoder; otherwise check battery and alarms, and reset the turns with "
+     "the "
      "protocol's command (`absenc run`)"},
     {FindingKind::turns_jump, "turns_jump", fault,
      "{0} times turns and position together moved further than a shaft can turn, by up to {1}, though the position "
@@ -407,10 +408,14 @@ std::string Examination::verdict() const {
     evidence += ")";
   }
   evidence += fmt::format(" (95 %: less than {:.2g} % fail)", 100 * measured.failures);
-  evidence += reported.valid == good ? ", each with a valid position"
-                                     : fmt::format(", {} with a position that is said to be valid", reported.valid);
-  if (good != 0 && reported.alarms == good) evidence += " and no alarm";
-  if (reported.valid < good) evidence += "; whether the others hold is not reported";
+  const bool no_alarm = good != 0 && reported.alarms == good;
+  if (reported.valid == good) {
+    evidence += fmt::format(", each with a valid position{}", no_alarm ? " and no alarm" : "");
+  } else {
+    if (no_alarm) evidence += ", each without an alarm";
+    if (reported.valid != 0) evidence += fmt::format(", {} with a valid position", reported.valid);
+    evidence += fmt::format("; whether the {}positions are valid is not reported", reported.valid != 0 ? "other " : "");
+  }
   if (!reported.missing.empty()) evidence += fmt::format("; not reported: {}", reported.missing);
   if (measured.slowest > Time{}) {
     const auto ms = [](Time time) { return std::chrono::duration<double, std::milli>(time).count(); };

@@ -43,7 +43,7 @@ constexpr void add_alarms(Reading& reading, const AlarmWords& words) {
 }
 
 /// Returns the reading of a reply; an empty one if the reply has no position. F1 and F2 say whether any error message
-/// is set, WRN says the same of warnings; without additional information warnings are unknown.
+/// is set, WRN says the same of warnings; without additional information warnings are not reported.
 [[nodiscard]] constexpr Reading reading_of(const Format& given, ModeCommand code, const Reply& reply) {
   Reading reading;
   if (!has_position(code)) return reading;
@@ -57,10 +57,9 @@ constexpr void add_alarms(Reading& reading, const AlarmWords& words) {
   reading.multiturn = resolution.multiturn_bits == 0 ? 0 : reply.position >> resolution.singleturn_bits;
   reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
   reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
-  // Without additional information nothing tells of warnings: which alarms are raised stays open until they are read.
+  reading.alarms = wrong ? alarm::error : 0;
+  reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
   if (reply.info_count != 0) {
-    reading.alarms = wrong ? alarm::error : 0;
-    reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
     const bool warns = reply.infos[0].warning;
     if (warns) reading.alarms |= alarm::warning;
     reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;
