@@ -5,6 +5,8 @@
 #include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <initializer_list>
 #include <sstream>
 
 #include "absenc/host/drive.hpp"
@@ -72,7 +74,7 @@ TEST_F(FtdiEncoder, SsiOfEveryLength) {
     ftdi::EncoderWires wires(LinkKind::clocked, ssi::line_settings, encoder);
     FakeFtdi usb(wires);
     FtdiPort port("", LinkKind::clocked, ssi::line_settings, {}, usb);
-    for (const std::int64_t position : {0x95C6'1234L, 0x3A59'8DE1L, 0xFFFF'FFFEL}) {
+    for (const std::int64_t position : std::initializer_list<std::int64_t>{0x95C6'1234, 0x3A59'8DE1, 0xFFFF'FFFE}) {
       shaft.state.position = position;
       ssi::ReadPosition read(format);
       ASSERT_TRUE(run(read, port));

@@ -2,6 +2,9 @@
 // Runs hosts of biss, ssi and an SPI protocol on an SPI port with a virtual encoder.
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <initializer_list>
+
 #include "absenc/host/drive.hpp"
 #include "absenc/os/linux/fake_spi_test.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -38,7 +41,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
     FakeSpi controller;
     controller.connect(LinkKind::clocked, ssi::line_settings, encoder);
     SpiPort port(FakeSpi::path, LinkKind::clocked, ssi::line_settings, {}, controller);
-    for (const std::int64_t position : {0x95C6'1234L, 0x3A59'8DE1L, 0xFFFF'FFFEL}) {
+    for (const std::int64_t position : std::initializer_list<std::int64_t>{0x95C6'1234, 0x3A59'8DE1, 0xFFFF'FFFE}) {
       shaft.state.position = position;
       ssi::ReadPosition read(format);
       ASSERT_TRUE(run(read, port));

@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <initializer_list>
 
 #include "absenc/os/linux/testing.hpp"
 #include "tests/shape_toys.hpp"
@@ -112,8 +113,9 @@ TEST_F(SpidevTest, RefusesUnsupportedSettings) {
 }
 
 TEST_F(SpidevTest, RefusesUnknownRequests) {
-  for (const unsigned long request : {_IOW(SPI_IOC_MAGIC, 6, std::uint8_t), _IOR(SPI_IOC_MAGIC, 0, std::uint32_t),
-                                      _IOW('j', 1, std::uint8_t), _IOW(SPI_IOC_MAGIC, 1, std::uint32_t), 0x5401ul}) {
+  for (const unsigned long request : std::initializer_list<unsigned long>{
+           _IOW(SPI_IOC_MAGIC, 6, std::uint8_t), _IOR(SPI_IOC_MAGIC, 0, std::uint32_t), _IOW('j', 1, std::uint8_t),
+           _IOW(SPI_IOC_MAGIC, 1, std::uint32_t), 0x5401}) {
     const SpidevReply reply = spidev.control(request, 0x1000, {}, 0, 1ms);
     EXPECT_FALSE(reply.again) << request;
     EXPECT_EQ(reply.result, -ENOTTY) << request;
