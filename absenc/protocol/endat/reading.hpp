@@ -57,9 +57,12 @@ constexpr void add_alarms(Reading& reading, const AlarmWords& words) {
   reading.multiturn = resolution.multiturn_bits == 0 ? 0 : reply.position >> resolution.singleturn_bits;
   reading.singleturn_valid_bits = wrong ? 0 : resolution.singleturn_bits;
   reading.multiturn_valid = !wrong && resolution.multiturn_bits != 0;
-  reading.alarms = wrong ? alarm::error : 0;
-  reading.alarms_reported = wrong ? alarm::error : alarm::error | alarm::errors;
+  if (!wrong) reading.alarms_reported = alarm::error | alarm::errors;
+  // Without additional information nothing tells of warnings, nor which error message is set: which alarms are raised
+  // stays open until they are read.
   if (reply.info_count != 0) {
+    reading.alarms = wrong ? alarm::error : 0;
+    reading.alarms_reported |= alarm::error;
     const bool warns = reply.infos[0].warning;
     if (warns) reading.alarms |= alarm::warning;
     reading.alarms_reported |= warns ? alarm::warning : alarm::warning | alarm::warnings;
