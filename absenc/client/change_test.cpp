@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,11 +26,12 @@ namespace {
 using Values = std::vector<std::int64_t>;
 using Stored = std::vector<std::uint8_t>;
 
-/// A port that fails after `left` steps, as if its adapter were unplugged.
+/// A port that calls `trouble` before each step after the first `left` ones.
 template <class Item>
-class BreakingPort final : public Port<Item> {
+class TroubledPort final : public Port<Item> {
  public:
-  BreakingPort(Link link, Port<Item>& port, std::size_t left) : link_(std::move(link)), port_(port), left_(left) {}
+  TroubledPort(Link link, Port<Item>& port, std::size_t left, std::function<void()> trouble)
+      : link_(std::move(link)), port_(port), left_(left), trouble_(std::move(trouble)) {}
   Time now() override { return port_.now(); }
   void begin(const Step<Item>& step) override {
     use();
@@ -41,26 +44,33 @@ class BreakingPort final : public Port<Item> {
 
  private:
   void use() {
-    if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
+    if (left_ == 0) return trouble_();
     --left_;
   }
   Link link_;  // owns the port to which `port_` refers
   Port<Item>& port_;
   std::size_t left_;
+  std::function<void()> trouble_;
 };
 
-Link breaking_link(Link whole, std::size_t steps) {
+Link troubled_link(Link whole, std::size_t steps, const std::function<void()>& trouble) {
   Link link;
   link.device = std::move(whole.device);
   link.place = whole.place;
   if (whole.bytes != nullptr) {
     Port<std::uint8_t>& port = *whole.bytes;
-    take_port<std::uint8_t>(link, std::make_shared<BreakingPort<std::uint8_t>>(std::move(whole), port, steps));
+    take_port<std::uint8_t>(link, std::make_shared<TroubledPort<std::uint8_t>>(std::move(whole), port, steps, trouble));
   } else {
     Port<CanFrame>& port = *whole.frames;
-    take_port<CanFrame>(link, std::make_shared<BreakingPort<CanFrame>>(std::move(whole), port, steps));
+    take_port<CanFrame>(link, std::make_shared<TroubledPort<CanFrame>>(std::move(whole), port, steps, trouble));
   }
   return link;
+}
+
+/// Returns a link whose port fails after `steps` steps, as if its adapter were unplugged.
+Link breaking_link(Link whole, std::size_t steps) {
+  return troubled_link(std::move(whole), steps,
+                       [] { throw os::Failure(os::Failure::Kind::lost, "the port went away"); });
 }
 
 struct Ended {
@@ -289,6 +299,31 @@ TEST(Change, IsReportedIfOnlyReadBackFails) {
     }
   }
   EXPECT_TRUE(failed);
+}
+
+TEST(Change, AdvisesHowToReadASettingThatIsAnotherOneAfterwards) {
+  std::optional<std::string> problem;
+  for (std::size_t steps = 0; steps < 100 && !problem; ++steps) {
+    Encoder encoder = make_encoder(parse_address("sim:tformat"), Time{}, [&](const EncoderAddress& one) {
+      Link whole = virtual_link(one);
+      VirtualDevice& device = *whole.device;
+      return troubled_link(std::move(whole), steps, [&device, before = stored(device)] {
+        std::ranges::copy(before, device.device().bytes->memory().begin());
+      });
+    });
+    encoder.connect();
+    try {
+      encoder.settings().set("overheat-threshold", std::array<std::int64_t, 1>{80});
+    } catch (const std::exception& failure) {
+      // If the value is lost earlier, the command that writes it finds out.
+      if (!std::string_view(failure.what()).starts_with("overheat-threshold was written, but")) continue;
+      problem = failure.what();
+      ASSERT_NE(change_of(failure), nullptr);
+      EXPECT_EQ(change_of(failure)->state, ChangeState::unknown);
+      EXPECT_EQ(change_of(failure)->advice, "`absenc config get sim:tformat overheat-threshold` shows what it is now");
+    }
+  }
+  EXPECT_TRUE(problem);
 }
 
 }  // namespace

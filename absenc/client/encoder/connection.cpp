@@ -33,27 +33,6 @@ std::string new_way(const EncoderAddress& before, const Command& command, Argume
   return fmt::format("it is reached with {} now", option_text(*before.unit, behind, command.changes_option));
 }
 
-// Returns the advice that explains how to find out whether an encoder was changed.
-std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
-  const Unit& unit = *before.unit;
-  if (!command.changes_option.empty()) {
-    const Options behind = options_behind(unit, before.options, command, arguments.front());
-    return fmt::format("try `absenc read {0}` with {1}, then with {2} as before, and only if neither answers search",
-                       address_of(before), option_text(unit, behind, command.changes_option),
-                       option_text(unit, before.options, command.changes_option));
-  }
-  const std::string address = shell_text(before.written);
-  if (!command.reads_back.empty()) {
-    return fmt::format("`absenc config get {} {}` shows what it is now", address, command.reads_back);
-  }
-  if (command.verb == Verb::memory_write && find_command(unit, Verb::memory_read) != nullptr) {
-    const std::int64_t page = role_value(command, arguments, Role::page);
-    return fmt::format("`absenc memory read {} 0x{:02X}{}` shows what is there now", address,
-                       role_value(command, arguments, Role::address), page != 0 ? fmt::format(" --page {}", page) : "");
-  }
-  return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
-}
-
 /// Compares the life counters of each good reading with those of the good reading before.
 class LifeCounters final : public FieldSink {
  public:
@@ -396,6 +375,26 @@ class ConnectionOn final : public Connection {
 };
 
 }  // namespace
+
+std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
+  const Unit& unit = *before.unit;
+  if (!command.changes_option.empty()) {
+    const Options behind = options_behind(unit, before.options, command, arguments.front());
+    return fmt::format("try `absenc read {0}` with {1}, then with {2} as before, and only if neither answers search",
+                       address_of(before), option_text(unit, behind, command.changes_option),
+                       option_text(unit, before.options, command.changes_option));
+  }
+  const std::string address = shell_text(before.written);
+  if (!command.reads_back.empty()) {
+    return fmt::format("`absenc config get {} {}` shows what it is now", address, command.reads_back);
+  }
+  if (command.verb == Verb::memory_write && find_command(unit, Verb::memory_read) != nullptr) {
+    const std::int64_t page = role_value(command, arguments, Role::page);
+    return fmt::format("`absenc memory read {} 0x{:02X}{}` shows what is there now", address,
+                       role_value(command, arguments, Role::address), page != 0 ? fmt::format(" --page {}", page) : "");
+  }
+  return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
+}
 
 std::string Trouble::text() const {
   std::string lines = fmt::format("{}: {}", text_of(error).name, message);

@@ -101,4 +101,8 @@ class Connection {
 /// Runs a command and passes its result to `sink`. Throws EncoderFailure, and as Connection::run.
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
 
+/// Returns the advice that explains how to find out whether an encoder was changed by a command. `before`: how the
+/// encoder was reached before the command.
+[[nodiscard]] std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments);
+
 }  // namespace absenc::client

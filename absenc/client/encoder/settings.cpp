@@ -60,15 +60,16 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Sett
   }
 }
 
-// Throws Failure if the value of the setting that was read back differs from the written value.
-void require_same(const Answer& now, const Answer& written, std::string_view name) {
+// Throws Failure if the value of the setting that was read back differs from the written value. `advice`: how to find
+// out which value the encoder has.
+void require_same(const Answer& now, const Answer& written, std::string_view name, const std::string& advice) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
     if (place == now.columns.size() || now.values[place] == written.values[i]) continue;
     const Failure failure(fmt::format("{} was written, but {} reads as {} instead of {}", name, written.columns[i].name,
                                       to_text(now.columns[place], now.values[place]),
                                       to_text(written.columns[i], written.values[i])));
-    throw OfChange<Failure>(failure, Change{ChangeState::unknown, "read it once more"});
+    throw OfChange<Failure>(failure, Change{ChangeState::unknown, advice});
   }
 }
 
@@ -139,16 +140,16 @@ SettingChange Settings::set(std::string_view name, std::span<const std::int64_t>
   Connection& connection = connection_of(*encoder_);
   const Setting setting = require_setting(connection.unit(), name);
   const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
-  const Options before = connection.uri().options;
+  const EncoderAddress before = connection.uri();
   SettingSink told;
   write(connection, *setting.setter, values, told);
   const Answer& written = told.sink.answer;
   SettingChange change{written, told.was_so, connection.change().state,
-                       note_of(connection.unit(), before, *setting.setter, values.front())};
+                       note_of(connection.unit(), before.options, *setting.setter, values.front())};
   if (setting.getter == nullptr) return change;
   try {
     change.now = answer_to(connection, *setting.getter);
-    require_same(change.now, written, setting.name());
+    require_same(change.now, written, setting.name(), advice_to_look(before, *setting.setter, values));
   } catch (const std::exception&) {
     rethrow_with(connection.change());
   }
