@@ -413,7 +413,7 @@ class Settings(MqttCase):
         self.assertTrue(self.mqtt(server)["connected"])
         self.file("absenc.toml", self.FILE.format(broker.url, "b", "/none/spool"))
         server.process.send_signal(signal.SIGHUP)
-        self.assertIn("/none/spool", self.event(server, "not all of it can be sent"))
+        self.assertIn("/none/spool", self.event(server, "not all of it can be done"))
         self.assertEqual(server.encoder()["state"], "live")
 
     def event(self, server, words):

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <system_error>
 #include <unordered_set>
 #include <utility>
 
@@ -87,6 +88,16 @@ std::vector<Fleet::Configured> Fleet::configured() const {
   return all;
 }
 
+std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std::size_t others) const {
+  try {
+    return std::make_shared<Watch>(encoder.name, encoder.address, encoder.rate, offset, *server_events_);
+  } catch (const std::system_error& error) {
+    throw Failure(
+        fmt::format("{} cannot be read beside {} other encoders, because this computer gives it no thread: {}",
+                    encoder.name, others, error.code().message()));
+  }
+}
+
 std::string Fleet::reload() {
   std::vector<Configured> all = configured();
   std::vector<Served> unchanged;
@@ -109,21 +120,27 @@ std::string Fleet::reload() {
   for (const auto& watch : ending) watch->wait();
   std::vector<std::string> added;
   std::vector<Served> next;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (os::interrupted()) throw os::Interrupted{};
-    const Configured& now = all[i];
-    const auto same = std::find_if(unchanged.begin(), unchanged.end(),
-                                   [&](const Served& one) { return one.watch->name() == now.name; });
-    if (same != unchanged.end()) {
-      next.push_back(*same);
-      continue;
+  Watches started;
+  try {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (os::interrupted()) throw os::Interrupted{};
+      const Configured& now = all[i];
+      const auto same = std::find_if(unchanged.begin(), unchanged.end(),
+                                     [&](const Served& one) { return one.watch->name() == now.name; });
+      if (same != unchanged.end()) {
+        next.push_back(*same);
+        continue;
+      }
+      added.push_back(now.name);
+      // New encoders with the same rate of readings are read at different times, spread over one period.
+      const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
+      started.push_back(start(now, Time(static_cast<std::int64_t>(1e9 * share)), i));
+      next.push_back({now.description, started.back()});
     }
-    added.push_back(now.name);
-    // New encoders with the same rate of readings are read at different times, spread over one period.
-    const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
-    const Time offset(static_cast<std::int64_t>(1e9 * share));
-    next.push_back(
-        {now.description, std::make_shared<Watch>(now.name, now.address, now.rate, offset, *server_events_)});
+  } catch (...) {
+    // The new encoders are all asked to stop before the first one is waited for.
+    for (const auto& watch : started) watch->request_stop();
+    throw;
   }
   const std::lock_guard lock(mutex_);
   served_ = std::move(next);

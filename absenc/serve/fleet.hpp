@@ -45,6 +45,8 @@ class Fleet {
     std::shared_ptr<Watch> watch;
   };
   [[nodiscard]] std::vector<Configured> configured() const;
+  /// Starts to read an encoder, beside `others` other ones. Throws Failure if there is no thread for it.
+  [[nodiscard]] std::shared_ptr<Watch> start(const Configured& encoder, Time offset, std::size_t others) const;
 
   std::vector<std::string> names_;
   double rate_;

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "absenc/os/hangup.hpp"
+#include "absenc/os/process.hpp"
 #include "absenc/os/realtime.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/mqtt_process.hpp"
@@ -72,13 +73,14 @@ void reload(serve::Server& server) {
     print_message(fmt::format("everything goes on as it was, because absenc.toml or the file of tokens is wrong: {}",
                               error.what()));
   } catch (const Failure& failure) {
-    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be done: {}", failure.what()));
   } catch (const os::Failure& failure) {
-    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be done: {}", failure.what()));
   }
 }
 
 int run_serve(const Invocation& invocation) {
+  os::limit_thread_stacks();
   os::catch_interrupts();
   const os::Descriptor hangups = os::catch_hangups();
   serve::Choices choices;

@@ -2,6 +2,7 @@
 #include "absenc/os/process.hpp"
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -63,6 +64,14 @@ void write_standard_error(std::string_view bytes) {
 std::vector<std::string> command_words(int count, char** words) { return {words, words + count}; }
 
 TerminalKind terminal_kind() { return {}; }
+
+void limit_thread_stacks() {
+  pthread_attr_t attributes;
+  ::pthread_attr_init(&attributes);
+  ::pthread_attr_setstacksize(&attributes, 1 << 20);
+  ::pthread_setattr_default_np(&attributes);
+  ::pthread_attr_destroy(&attributes);
+}
 
 bool is_terminal(int descriptor) { return ::isatty(descriptor) == 1; }
 

@@ -78,6 +78,8 @@ int write_standard_output(std::string_view bytes) { return write_stream(standard
 
 void write_standard_error(std::string_view bytes) { static_cast<void>(write_stream(standard_stream(2), bytes)); }
 
+void limit_thread_stacks() {}
+
 bool is_terminal(int descriptor) {
   return descriptor >= 0 && descriptor <= 2 && is_console(standard_stream(descriptor));
 }
