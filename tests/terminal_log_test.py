@@ -116,7 +116,7 @@ class Damage(Case):
     def test_identify_reports_damage_with_result(self):
         path = self.capture("cut.sr")
         os.truncate(path, os.path.getsize(path) // 2)
-        result = absenc("identify", path)
+        result = absenc("identify", path, timeout=300)  # an emulated program takes minutes
         self.assert_good(result)
         self.assert_sentence(result.stderr, "note: the capture is damaged at byte", "cut off")
 
