@@ -141,6 +141,11 @@ class DoctorFaults(Case):
             self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
 
+    def test_echo_is_found_with_high_latency(self):
+        """With a high latency the readings that compare both settings of the echo take longer."""
+        self.latency = HIGH_LATENCY
+        print(self.examine_fault("encolink", "own echo", faults.Echo, "wrong_echo"), flush=True)
+
     def test_another_model(self):
         """Reads an encoder of one model with another one selected; some pairs are the same model."""
         cases = []
