@@ -323,7 +323,7 @@ class Doctor {
       Examiner<Item> examiner(address, surroundings_.open(address), choices_);
       examiner.wait_until(earliest);
       const Time begin = examiner.now();
-      // A reading may take twice the latency: until the reply is there or missed, and until the line is silent behind it.
+      // A reading may take twice the latency: until its reply is there or missed, then until the line is silent.
       const Time latencies = 2 * static_cast<int>(count) * address.latency.value_or(Time{});
       const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character() + latencies;
       examiner.read(*read, count, limit, attempts);
