@@ -16,7 +16,7 @@ from architectures import BIG_ENDIAN, PUBLISHED, build_tree
 LEFT_OUT = {
     "qemu has neither the calls for SPI controllers nor those for rates, which tests/emulated/termios2.cpp replaces for the "
     "command alone, within one process":
-        r"os|example\.virtual_encoder|(clocked|e201|raa38|raa38_modbus)\.py",
+        r"os|reading_allocations|example\.virtual_encoder|(clocked|e201|raa38|raa38_modbus)\.py",
     "the emulated program starts other programs, or a script of this computer loads it":
         r"(bug_report|first_minutes|keys|mqtt_.*|readme|serve_.*)\.py",
     "they expect times that an emulated program, which starts in half a second, does not keep":
