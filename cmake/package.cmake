@@ -70,6 +70,8 @@ if(TARGET absenc-python)
   absenc_package(python3-absenc python "${PROJECT_DESCRIPTION} (Python)"
     "Absolute encoders of servo motors where tests are written and data is looked"
     "at: read them, emulate them in tests, decode captures into NumPy arrays.")
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_CONTROL_EXTRA "${PROJECT_SOURCE_DIR}/cmake/debian/python/prerm")
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_CONTROL_STRICT_PERMISSION ON)
   set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_DEPENDS
       "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${python3_next_minor}), python3-numpy")

@@ -55,16 +55,18 @@ class Upgraded(RootCase):
         subprocess.run(["dpkg-deb", "--root-owner-group", "-b", old, self.root / "srv/old.deb"], check=True, capture_output=True)
         self.shell("dpkg -i /srv/old.deb; mkdir -p /etc/absenc /var/lib/absenc; echo x > /etc/absenc/absenc.toml;"
                    "echo x > /var/lib/absenc/history.sqlite")
-        for package in ("absenc", "absenc-serve", "absenc-hdf5"):
+        for package in ("absenc", "absenc-serve", "absenc-hdf5", "python3-absenc"):
             self.put(artefact(f"{package}_*_amd64.deb"))
         # apt installs the packages in this order, because absenc-serve breaks the old absenc
-        self.shell("dpkg -i /srv/absenc_*.deb; dpkg -i /srv/absenc-*.deb", timeout=300)
+        self.shell("dpkg -i /srv/absenc_*.deb; dpkg -i /srv/absenc-*.deb /srv/python3-*.deb", timeout=300)
         self.assertIn(f"absenc {VERSION}", self.run_inside("absenc", "--version"))
         self.assertIn("absenc-serve", self.shell("dpkg -S lib/systemd/system/absenc.service"))
-        self.shell("dpkg -r absenc-serve absenc-hdf5 absenc")
+        self.shell("python3 -c 'import absenc'")  # Python compiles the modules
+        self.shell("dpkg -r absenc-serve absenc-hdf5 python3-absenc absenc")
         for kept in ("etc/absenc/absenc.toml", "var/lib/absenc/history.sqlite"):
             self.assertTrue((self.root / kept).exists(), kept)
         self.assertFalse((self.root / "usr/lib/absenc").exists())
+        self.assertFalse((self.root / "usr/lib/python3/dist-packages/absenc").exists())
         self.shell("dpkg -P absenc-serve absenc-hdf5 absenc")
         self.assertFalse((self.root / "var/lib/absenc").exists())
         self.assertTrue((self.root / "etc/absenc/absenc.toml").exists(), "the user wrote it, so it stays")

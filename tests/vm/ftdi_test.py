@@ -195,9 +195,13 @@ class Reading(Ftdi):
 
     def test_identify(self):
         self.chip("biss?motion=rpm=60")
-        found = self.run_json("identify", "ftdi")["candidates"][0]
-        self.assertEqual((found["protocol"], found["options"].get("singleturn_bits")), ("biss", 19))
-        self.assertEqual(found["identity"]["serial_number"], 1)
+        for _ in range(5):
+            found = self.run_json("identify", "ftdi")["candidates"][0]
+            self.assertEqual((found["protocol"], found["options"].get("singleturn_bits")), ("biss", 19))
+            # A busy machine may disturb the accesses to the registers that have the identity.
+            if "serial_number" in found["identity"]:
+                break
+        self.assertEqual(found["identity"].get("serial_number"), 1)
 
     def test_identify_every_clocked_unit(self):
         """The shaft turns. SSI has no checksum: it is one of several candidates, and no conclusion."""
