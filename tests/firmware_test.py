@@ -193,7 +193,7 @@ class Encoder(unittest.TestCase):
         process, encoder = self.start("m0plus", 0, LATENCY // 5, 8 * LATENCY)
         output = self.run_well("conform", encoder)
         self.assertRegex(output, r"\b[1-9]\d* kept, 0 broken, 2 untested")
-        # An emulated machine takes longer than the 3 us of the document, as does the way to it.
+        # Over a network the 3 us of the document cannot be measured.
         self.assertRegex(output, r"untested: answer-time: ")
         self.assertRegex(output, r"untested: bad-delimiter: (.*\n){2} *this kind of port cannot change to")
         end(process)

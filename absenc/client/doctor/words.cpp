@@ -232,8 +232,7 @@ constexpr auto table = std::to_array<Words>({
      "turns are not counted: a single-turn encoder, no battery, a counter that is switched off, or a fault of the "
      "encoder",
      "select its model if it is a single-turn encoder; otherwise check battery and alarms, and reset the turns with "
-     "the "
-     "protocol's command (`absenc run`)"},
+     "the protocol's command (`absenc run`)"},
     {FindingKind::turns_jump, "turns_jump", fault,
      "{0} times turns and position together moved further than a shaft can turn, by up to {1}, though the position "
      "within the turn did not",
