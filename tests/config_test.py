@@ -188,6 +188,7 @@ class ManyEncoders(ConfigCase):
         process = self.served(1.25)
         said = read_line(process.stderr, time.monotonic() + PATIENCE)
         self.assertRegex(said, r"axis\d+ cannot be read beside \d+ other encoders, because this computer gives it no thread")
+        self.assertIn("ulimit", said)
         self.assertEqual(process.wait(PATIENCE), 1)
 
 

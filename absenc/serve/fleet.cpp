@@ -93,7 +93,8 @@ std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std:
     return std::make_shared<Watch>(encoder.name, encoder.address, encoder.rate, offset, *server_events_);
   } catch (const std::system_error& error) {
     throw Failure(
-        fmt::format("{} cannot be read beside {} other encoders, because this computer gives it no thread: {}",
+        fmt::format("{} cannot be read beside {} other encoders, because this computer gives it no thread: {}; "
+                    "serve fewer of them, or raise the limits of memory and threads (ulimit -v, ulimit -u)",
                     encoder.name, others, error.code().message()));
   }
 }
