@@ -12,6 +12,7 @@
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/identify/patience.hpp"
 #include "absenc/client/identify/probe_settings.hpp"
+#include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/port/link.hpp"
 #include "absenc/client/port/runner.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -65,6 +66,7 @@ struct Introduction {
   Answer identity{};
   bool agrees = false;          // whether the encoder reported an identity that does not contradict the options
   std::string contradiction{};  // the unit's explanation of the contradiction between identity and options; "": none
+  std::vector<std::string> unread{};  // the commands that failed, each with its error in words
 };
 
 /// Collects the identity fields of a reply.
@@ -162,8 +164,14 @@ class Attempt {
       // Tries again, because an access that consists of many frames may fail once on a busy computer.
       if (one.error == Error::timeout || is_damage(one.error)) one = converse(command, options, ignored, &identity);
       all.agrees = all.agrees || one.error == Error::none;
+      if (one.error == Error::none || !one.was_sent) continue;
       const bool contradicts = one.error == Error::unexpected_reply || one.error == Error::out_of_range;
-      if (contradicts) all.contradiction = fmt::format("{}: {}", command.name, one.detail);
+      if (contradicts) {
+        all.contradiction = fmt::format("{}: {}", command.name, one.detail);
+      } else {
+        const std::string reason = describe(unit_.link, Subject::reply, one.error, one.detail);
+        all.unread.push_back(fmt::format("{} could not be read: {}", command.name, reason));
+      }
     }
     all.agrees = all.agrees && all.contradiction.empty();
     all.identity = std::move(identity.all.answer);
@@ -213,6 +221,7 @@ class Attempt {
     Error error = Error::timeout;
     std::string detail{};  // the unit's explanation of `error`
     bool ended = false;    // whether the command ran to its end, instead of being aborted
+    bool was_sent = true;  // false: it might be a command to another encoder; a note says so
   };
 
   // Runs one conversation and stores its exchanges in `exchanges`. On a line of characters it repeats the conversation
@@ -262,6 +271,7 @@ class Attempt {
     } catch (const TryEnd& stop) {
       talk_ = nullptr;
       if (stop == TryEnd::harmful) {
+        one.was_sent = false;
         findings_.notes.push_back(
             fmt::format("{} of {} was not sent: to another encoder it might be a command", command.name, unit_.id));
       }

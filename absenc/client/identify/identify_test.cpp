@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Identifies virtual encoders on lines in virtual time, with damage, echo and late replies.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "absenc/client/identify/attempt.hpp"
@@ -9,6 +10,10 @@
 
 namespace absenc::client {
 namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A line with one encoder, which is powered on again each time the port is opened.
 struct Place {
@@ -168,6 +173,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
     const Candidate& best = findings.candidates.front();
     EXPECT_EQ(best.unit, &unit);
     EXPECT_TRUE(is_found(best));
+    EXPECT_THAT(findings.notes, Not(Contains(HasSubstr("who it is"))));
     const unsigned found = unit.resolution(best.hypothesis.options).singleturn_bits;
     const unsigned wanted = unit.resolution(place.encoder.options).singleturn_bits;
     EXPECT_TRUE(found == wanted || best.hypothesis.at_least || reads_right(place, best.hypothesis.options))
@@ -205,6 +211,38 @@ TEST(Identify, TheEncoderItselfTellsModelsApartWhoseRepliesAreAlike) {
       }
     }
   }
+}
+
+/// Returns what the search finds on the line of a T-format encoder if `change` is called before the encoder is asked
+/// for its identity.
+LineFindings found_with(Place& place, const std::function<void()>& change) {
+  LineSearch search = place.search();
+  search.progress = [&](const std::string& text) {
+    if (text == "tformat: who it is") change();
+  };
+  return search_line(search);
+}
+
+TEST(Identify, SaysWhatOfTheIdentityCouldNotBeReadAndWhy) {
+  for (const auto& [fault, reason] : {std::pair("silence=1", "the encoder did not answer"),
+                                      std::pair("corrupt=1", "the checksum of the reply is wrong")}) {
+    SCOPED_TRACE(fault);
+    Place place("sim:tformat");
+    const LineFindings findings = found_with(place, [&] { place.encoder.device.faults = {fault}; });
+    ASSERT_FALSE(findings.candidates.empty());
+    EXPECT_TRUE(findings.candidates.front().identity.columns.empty());
+    const std::string note = fmt::format("tformat: not known who it is: encoder-id could not be read: {}", reason);
+    EXPECT_THAT(findings.notes, Contains(note));
+  }
+}
+
+TEST(Identify, SaysWhoWasNotAskedWhenTheTimeWasOver) {
+  Place place("sim:tformat");
+  const LineFindings findings = found_with(place, [&] { place.clock.time += std::chrono::hours(2); });
+  EXPECT_TRUE(findings.out_of_time);
+  ASSERT_FALSE(findings.candidates.empty());
+  EXPECT_TRUE(findings.candidates.front().identity.columns.empty());
+  EXPECT_THAT(findings.notes, Contains("not asked who it is: tformat: the time is over"));
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ class Search {
     rank(findings_.candidates, findings_.searches);
     drop_repeated();
     while_there_is_time([this] { ask_who_they_are(); });
+    if (findings_.out_of_time) note_who_was_not_asked();
     return std::move(findings_);
   }
 
@@ -109,18 +110,33 @@ class Search {
   // such candidate if the unit has no identity. Removes the candidates that `judge` drops.
   void ask_who_they_are() {
     std::vector<Candidate>& all = findings_.candidates;
-    std::set<std::pair<const Unit*, std::string>> asked;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      if (all[i].unit == nullptr || all[i].unsolicited || !is_found(all[i])) continue;
-      if (!asked.emplace(all[i].unit, all[i].encoder).second) continue;
+      if (!is_to_be_asked(all[i])) continue;
+      const auto encoder = std::pair(all[i].unit, all[i].encoder);
       const std::vector<std::size_t> alike = same_as(i);
-      if (alike.size() == 1 && find_role(all[i].unit->fields, Role::identity) == nullptr) continue;
-      if (search_.progress) search_.progress(fmt::format("{}: who it is", all[i].unit->id));
-      std::vector<Introduction> said;
-      for (const std::size_t one : alike) said.push_back(introduce(all[one]));
-      judge(alike, said);
+      if (alike.size() > 1 || find_role(all[i].unit->fields, Role::identity) != nullptr) {
+        if (search_.progress) search_.progress(fmt::format("{}: who it is", all[i].unit->id));
+        std::vector<Introduction> said;
+        for (const std::size_t one : alike) said.push_back(introduce(all[one]));
+        judge(alike, said);
+      }
+      asked_.insert(encoder);
     }
     std::erase_if(all, [](const Candidate& one) { return one.unit == nullptr; });
+  }
+
+  // Returns whether the candidate is the likeliest of an encoder that replies to requests and whose identity was not
+  // asked for.
+  [[nodiscard]] bool is_to_be_asked(const Candidate& one) const {
+    return one.unit != nullptr && !one.unsolicited && is_found(one) && !asked_.contains({one.unit, one.encoder});
+  }
+
+  void note_who_was_not_asked() {
+    for (const Candidate& one : findings_.candidates) {
+      if (!is_to_be_asked(one) || find_role(one.unit->fields, Role::identity) == nullptr) continue;
+      asked_.emplace(one.unit, one.encoder);
+      findings_.notes.push_back(fmt::format("not asked who it is: {}: the time is over", one.unit->id));
+    }
   }
 
   // Returns the indexes of the candidate `first` and of equally likely candidates of the same encoder, at most four in
@@ -136,12 +152,16 @@ class Search {
   }
 
   // Stores the reported identities. Drops candidates whose options the identity contradicts, if it agrees with those of
-  // another candidate; otherwise adds a note if the identity contradicts the likeliest candidate.
+  // another candidate; otherwise adds a note if the identity contradicts the likeliest candidate. Adds a note for each
+  // part of the identity that could not be read with the options of the likeliest candidate.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {
       Candidate& candidate = findings_.candidates[alike[i]];
       candidate.identity = said[i].identity;
+      for (const std::string& one : i == 0 ? said[i].unread : std::vector<std::string>()) {
+        findings_.notes.push_back(fmt::format("{}: not known who it is: {}", candidate.unit->id, one));
+      }
       if (said[i].contradiction.empty()) continue;
       if (known) {
         candidate.unit = nullptr;
@@ -152,6 +172,7 @@ class Search {
   }
 
   Introduction introduce(const Candidate& candidate) {
+    if (search_.now() >= deadline_) throw OutOfTime{};
     if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
     return introduce_on<std::uint8_t>(candidate);
   }
@@ -319,6 +340,7 @@ class Search {
   Time deadline_;
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
+  std::set<std::pair<const Unit*, std::string>> asked_;  // the encoders that were asked for their identities
   std::vector<const Unit*> silent_;  // units whose first requests got no reply; they are tried again later
   std::optional<os::Failure> failure_;
   bool opened_ = false;

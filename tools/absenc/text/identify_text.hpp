@@ -22,8 +22,15 @@ using namespace client;
 /// Returns the command that decodes a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// Prints the candidates of a search. Returns exit_good only if the first candidate cannot be explained by chance.
-int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
-                    bool json);
+/// What a search leaves open.
+struct LeftOpen {
+  std::vector<std::string> notes{};  // sentences about what could not be tried or read, and what is damaged
+  bool is_complete = true;           // false: the search was ended before everything was tried
+};
+
+/// Prints the candidates of a search; as JSON also what the search leaves open. Returns exit_good only if the first
+/// candidate cannot be explained by chance.
+int show_candidates(std::span<const Candidate> candidates, const LeftOpen& open,
+                    const std::function<std::string(const Candidate&)>& command, bool json);
 
 }  // namespace absenc::tool

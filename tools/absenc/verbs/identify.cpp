@@ -83,7 +83,7 @@ int identify_frames(const Invocation& invocation) {
     if (requests != 0) text += fmt::format(" --request \"{}\"", invocation.texts("--request").front());
     return text + fmt::format(" --hex \"{}\"", invocation.texts("--hex").front());
   };
-  const int status = show_candidates(candidates, command, invocation.has("--json"));
+  const int status = show_candidates(candidates, {}, command, invocation.has("--json"));
   if (candidates.empty()) {
     print_message(
         "no protocol explains any of these frames\n"
@@ -109,7 +109,8 @@ int identify_line(const Invocation& invocation) {
   progress.clear();
   for (const std::string& note : findings.notes) print_message(fmt::format("note: {}", note));
   const auto command = [&](const Candidate& candidate) { return read_command(candidate, search.place); };
-  const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
+  const LeftOpen open{findings.notes, !findings.interrupted && !findings.out_of_time};
+  const int status = show_candidates(findings.candidates, open, command, invocation.has("--json"));
   if (findings.interrupted) print_message("interrupted: not everything was tried");
   if (findings.out_of_time) print_message("the time is over, and not everything was tried: give more with --for");
   if (findings.candidates.empty() && !findings.interrupted) print_message(advice_for(findings, search));
@@ -131,7 +132,7 @@ int identify_capture(const Invocation& invocation) {
     if (choices.how.baud > 0) text += fmt::format(" --baud {}", choices.how.baud);
     return invocation.has("--parity") ? text + fmt::format(" --parity {}", invocation.text("--parity")) : text;
   };
-  const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
+  const int status = show_candidates(findings.candidates, {findings.damages}, command, invocation.has("--json"));
   for (const std::string& damage : findings.damages) print_message(fmt::format("note: {}", damage));
   if (findings.candidates.empty()) {
     for (const std::string& refusal : findings.refusals) print_message(fmt::format("note: {}", refusal));
