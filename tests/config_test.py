@@ -2,10 +2,13 @@
 """Tests the configuration file absenc.toml."""
 import json
 import os
+import re
 import resource
+import signal
 import subprocess
 import time
 import unittest
+import urllib.request
 
 from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, json_lines, read_line
 
@@ -190,6 +193,33 @@ class ManyEncoders(ConfigCase):
         self.assertRegex(said, r"axis\d+ cannot be read beside \d+ other encoders, because this computer gives it no thread")
         self.assertIn("ulimit", said)
         self.assertEqual(process.wait(PATIENCE), 1)
+
+    @unittest.skipIf(os.environ.get("ABSENC_IN_QEMU"), "qemu needs more addresses than the test leaves")
+    def test_serve_goes_on_with_the_encoders_that_have_a_thread(self):
+        """An encoder without a thread is read once the file has fewer."""
+        def reload(count):
+            self.many(count)
+            process.send_signal(signal.SIGHUP)
+            for line in iter(lambda: read_line(process.stderr, time.monotonic() + PATIENCE), None):
+                if "was read again" in line:
+                    return line
+            return ""
+
+        def served():
+            with urllib.request.urlopen(url + "api/encoders", timeout=PATIENCE) as reply:
+                return {one["encoder"] for one in json.load(reply)["encoders"]}
+
+        self.many(3)
+        process = self.served(1.25)
+        url = re.search(r"http://[0-9.:]+/", process.stdout.readline().decode())[0]
+        said = reload(1000)
+        begun, left_out = re.search(r"3 unchanged; ended: none; begun: (.*); not begun: (.*): axis", said).groups()
+        self.assertRegex(said, r"axis\d+ cannot be read beside \d+ other encoders, because this computer gives it no thread")
+        self.assertEqual(len(begun.split(", ")) + len(left_out.split(", ")), 997)
+        self.assertEqual(served(), {"axis0", "axis1", "axis2", *begun.split(", ")})
+        self.assertIn("4 unchanged", reload(4))
+        self.assertEqual(served(), {f"axis{i}" for i in range(4)})
+        self.assertEqual(end(process)[0], 0)
 
 
 class WrongFiles(ConfigCase):

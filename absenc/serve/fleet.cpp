@@ -45,7 +45,13 @@ struct Fleet::Configured {
 
 Fleet::Fleet(std::vector<std::string> names, double rate, int realtime, ServerEvents& server_events)
     : names_(std::move(names)), rate_(rate), realtime_(realtime), server_events_(&server_events) {
-  reload();
+  try {
+    const Changes changes = change_to(configured());
+    if (changes.failure) throw Failure(*changes.failure);
+  } catch (...) {
+    end();
+    throw;
+  }
 }
 
 Fleet::~Fleet() { end(); }
@@ -100,54 +106,68 @@ std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std:
 }
 
 std::string Fleet::reload() {
-  std::vector<Configured> all = configured();
-  std::vector<Served> unchanged;
+  const Changes changes = change_to(configured());
+  const auto listed = [](const std::vector<std::string>& names) {
+    return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+  };
+  std::string text = fmt::format("{} unchanged; ended: {}; begun: {}", changes.unchanged, listed(changes.ended),
+                                 listed(changes.begun));
+  if (changes.failure) text += fmt::format("; not begun: {}: {}", listed(changes.left_out), changes.failure->what());
+  return text;
+}
+
+Fleet::Changes Fleet::change_to(const std::vector<Configured>& all) {
+  Changes changes;
   Watches ending;
-  std::vector<std::string> ended;
+  std::vector<Served> unchanged;
   {
     const std::lock_guard lock(mutex_);
-    for (Served& one : served_) {
+    for (const Served& one : served_) {
       const bool stays = std::any_of(all.begin(), all.end(), [&](const Configured& now) {
         return now.name == one.watch->name() && now.description == one.description;
       });
-      if (!stays) ended.push_back(one.watch->name());
-      if (!stays) ending.push_back(one.watch);
-      if (stays) unchanged.push_back(one);
+      if (stays) {
+        unchanged.push_back(one);
+      } else {
+        changes.ended.push_back(one.watch->name());
+        ending.push_back(one.watch);
+      }
     }
   }
+  changes.unchanged = unchanged.size();
   // The encoders to remove are stopped before new ones start, because a new encoder may need the port of a removed
   // one.
   for (const auto& watch : ending) watch->request_stop();
   for (const auto& watch : ending) watch->wait();
-  std::vector<std::string> added;
   std::vector<Served> next;
-  Watches started;
-  try {
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      if (os::interrupted()) throw os::Interrupted{};
-      const Configured& now = all[i];
-      const auto same = std::find_if(unchanged.begin(), unchanged.end(),
-                                     [&](const Served& one) { return one.watch->name() == now.name; });
-      if (same != unchanged.end()) {
-        next.push_back(*same);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Configured& now = all[i];
+    const auto same = std::find_if(unchanged.begin(), unchanged.end(),
+                                   [&](const Served& one) { return one.watch->name() == now.name; });
+    if (same != unchanged.end()) {
+      next.push_back(*same);
+      continue;
+    }
+    if (os::interrupted()) continue;
+    // New encoders with the same rate of readings are read at different times, spread over one period.
+    const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
+    try {
+      if (!changes.failure) {
+        next.push_back({now.description, start(now, Time(static_cast<std::int64_t>(1e9 * share)), next.size())});
+        changes.begun.push_back(now.name);
         continue;
       }
-      added.push_back(now.name);
-      // New encoders with the same rate of readings are read at different times, spread over one period.
-      const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
-      started.push_back(start(now, Time(static_cast<std::int64_t>(1e9 * share)), i));
-      next.push_back({now.description, started.back()});
+    } catch (const Failure& failure) {
+      changes.failure = failure;
     }
-  } catch (...) {
-    // The new encoders are all asked to stop before the first one is waited for.
-    for (const auto& watch : started) watch->request_stop();
-    throw;
+    changes.left_out.push_back(now.name);
   }
-  const std::lock_guard lock(mutex_);
-  served_ = std::move(next);
-  return fmt::format("{} unchanged; ended: {}; begun: {}", unchanged.size(),
-                     ended.empty() ? "none" : fmt::format("{}", fmt::join(ended, ", ")),
-                     added.empty() ? "none" : fmt::format("{}", fmt::join(added, ", ")));
+  {
+    const std::lock_guard lock(mutex_);
+    served_ = std::move(next);
+  }
+  if (os::interrupted()) throw os::Interrupted{};
+  return changes;
 }
 
 Fleet::Watches Fleet::all() const {

@@ -4,10 +4,12 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/error.hpp"
 #include "absenc/serve/watch.hpp"
 
 namespace absenc::serve {
@@ -28,8 +30,9 @@ class Fleet {
   /// Ends the reading threads of all encoders, and waits for the end of each. Orders that have not begun are refused.
   void end();
 
-  /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words. Throws
-  /// UsageError, Failure, os::Interrupted. Call it from one thread only.
+  /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words, also for which
+  /// encoders there is no thread: they are not served until a later call has one for them. Throws UsageError, Failure
+  /// if the file cannot be read, os::Interrupted. Call it from one thread only.
   std::string reload();
 
   [[nodiscard]] Watches all() const;
@@ -44,7 +47,17 @@ class Fleet {
     std::string description;
     std::shared_ptr<Watch> watch;
   };
+  struct Changes {
+    std::size_t unchanged = 0;
+    std::vector<std::string> ended{};
+    std::vector<std::string> begun{};
+    std::vector<std::string> left_out{};       // encoders that are not read, for the reason `failure`
+    std::optional<client::Failure> failure{};  // why the first of `left_out` could not begin
+  };
   [[nodiscard]] std::vector<Configured> configured() const;
+  /// Ends the encoders that are not in `all` with the same settings, and begins the others of `all`. Once there is no
+  /// thread for one, no further one is begun. Throws os::Interrupted.
+  [[nodiscard]] Changes change_to(const std::vector<Configured>& all);
   /// Starts to read an encoder, beside `others` other ones. Throws Failure if there is no thread for it.
   [[nodiscard]] std::shared_ptr<Watch> start(const Configured& encoder, Time offset, std::size_t others) const;
 
