@@ -70,7 +70,7 @@ class IdentifyOnLine(EncoderCase):
                       name=f"line{index}") as emulator:
             place = ("slcan:" if unit["link"] == "can" else "") + emulator.path
             result, found = identify(place, "--for", str(SEARCH), timeout=2 * SEARCH)
-            self.assertEqual(result.returncode, 0, f"{protocol}: {result.stdout}{result.stderr}")
+            self.assertEqual((result.returncode, found and found["complete"]), (0, True), f"{protocol}: {result.stdout}{result.stderr}")
             # The added latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
@@ -200,8 +200,20 @@ class UnknownLine(Case):
         self.assertNotIn("go on with", result.stdout)
 
     def test_time_is_limited(self):
-        result = absenc("identify", self.path, "--for", "0.3")
+        result, found = identify(self.path, "--for", "0.3")
         self.assert_failed(result, "the time is over")
+        self.assertFalse(found["complete"])
+
+    def test_says_that_the_identity_could_not_be_read(self):
+        """The encoder answers readings, and no request for its encoder id."""
+        reading = bytes.fromhex("1A 00 45 23 01 11 34 12 00 00 4A")
+        self.serve(lambda request: reading if request == reading[:1] else b"")
+        result, found = identify(f"{self.path}?baud=2500000", "--for", str(SEARCH))
+        self.assertEqual((result.returncode, found["candidates"][0]["protocol"], found["complete"]), (0, "tformat", True))
+        self.assertEqual(found["candidates"][0]["identity"], {})
+        note = "tformat: not known who it is: encoder-id could not be read: the encoder did not answer"
+        self.assertEqual(found["notes"], [note])
+        self.assertIn(f"note: {note}\n", result.stderr)
 
     def test_interrupt_ends_it(self):
         process = subprocess.Popen([ABSENC, "identify", self.path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
