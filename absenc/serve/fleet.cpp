@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <new>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
@@ -95,13 +96,18 @@ std::vector<Fleet::Configured> Fleet::configured() const {
 }
 
 std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std::size_t others) const {
+  const auto failure = [&](std::string_view reason) {
+    return Failure(
+        fmt::format("{} cannot be read beside {} other encoders, because this computer gives it no {}; "
+                    "serve fewer of them, or raise the limits of memory and threads (ulimit -v, ulimit -u)",
+                    encoder.name, others, reason));
+  };
   try {
     return std::make_shared<Watch>(encoder.name, encoder.address, encoder.rate, offset, *server_events_);
   } catch (const std::system_error& error) {
-    throw Failure(
-        fmt::format("{} cannot be read beside {} other encoders, because this computer gives it no thread: {}; "
-                    "serve fewer of them, or raise the limits of memory and threads (ulimit -v, ulimit -u)",
-                    encoder.name, others, error.code().message()));
+    throw failure(fmt::format("thread: {}", error.code().message()));
+  } catch (const std::bad_alloc&) {
+    throw failure("memory");
   }
 }
 
@@ -151,16 +157,17 @@ Fleet::Changes Fleet::change_to(const std::vector<Configured>& all) {
     if (os::interrupted()) continue;
     // New encoders with the same rate of readings are read at different times, spread over one period.
     const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
+    if (changes.failure) {
+      changes.left_out.push_back(now.name);
+      continue;
+    }
     try {
-      if (!changes.failure) {
-        next.push_back({now.description, start(now, Time(static_cast<std::int64_t>(1e9 * share)), next.size())});
-        changes.begun.push_back(now.name);
-        continue;
-      }
+      next.push_back({now.description, start(now, Time(static_cast<std::int64_t>(1e9 * share)), next.size())});
+      changes.begun.push_back(now.name);
     } catch (const Failure& failure) {
       changes.failure = failure;
+      changes.left_out.push_back(now.name);
     }
-    changes.left_out.push_back(now.name);
   }
   {
     const std::lock_guard lock(mutex_);

@@ -58,7 +58,7 @@ class Fleet {
   /// Ends the encoders that are not in `all` with the same settings, and begins the others of `all`. Once there is no
   /// thread for one, no further one is begun. Throws os::Interrupted.
   [[nodiscard]] Changes change_to(const std::vector<Configured>& all);
-  /// Starts to read an encoder, beside `others` other ones. Throws Failure if there is no thread for it.
+  /// Starts to read an encoder, beside `others` other ones. Throws Failure if there is no thread or memory for it.
   [[nodiscard]] std::shared_ptr<Watch> start(const Configured& encoder, Time offset, std::size_t others) const;
 
   std::vector<std::string> names_;
