@@ -47,7 +47,7 @@ struct Fleet::Configured {
 Fleet::Fleet(std::vector<std::string> names, double rate, int realtime, ServerEvents& server_events)
     : names_(std::move(names)), rate_(rate), realtime_(realtime), server_events_(&server_events) {
   try {
-    const Changes changes = change_to(configured());
+    const Reloaded changes = change_to(configured());
     if (changes.failure) throw Failure(*changes.failure);
   } catch (...) {
     end();
@@ -112,7 +112,7 @@ std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std:
 }
 
 std::string Fleet::reload() {
-  const Changes changes = change_to(configured());
+  const Reloaded changes = change_to(configured());
   const auto listed = [](const std::vector<std::string>& names) {
     return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
   };
@@ -122,8 +122,8 @@ std::string Fleet::reload() {
   return text;
 }
 
-Fleet::Changes Fleet::change_to(const std::vector<Configured>& all) {
-  Changes changes;
+Fleet::Reloaded Fleet::change_to(const std::vector<Configured>& all) {
+  Reloaded changes;
   Watches ending;
   std::vector<Served> unchanged;
   {

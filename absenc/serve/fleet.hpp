@@ -47,7 +47,7 @@ class Fleet {
     std::string description;
     std::shared_ptr<Watch> watch;
   };
-  struct Changes {
+  struct Reloaded {
     std::size_t unchanged = 0;
     std::vector<std::string> ended{};
     std::vector<std::string> begun{};
@@ -57,7 +57,7 @@ class Fleet {
   [[nodiscard]] std::vector<Configured> configured() const;
   /// Ends the encoders that are not in `all` with the same settings, and begins the others of `all`. Once there is no
   /// thread for one, no further one is begun. Throws os::Interrupted.
-  [[nodiscard]] Changes change_to(const std::vector<Configured>& all);
+  [[nodiscard]] Reloaded change_to(const std::vector<Configured>& all);
   /// Starts to read an encoder, beside `others` other ones. Throws Failure if there is no thread or memory for it.
   [[nodiscard]] std::shared_ptr<Watch> start(const Configured& encoder, Time offset, std::size_t others) const;
 
