@@ -211,7 +211,8 @@ class UnknownLine(Case):
         result, found = identify(f"{self.path}?baud=2500000", "--for", str(SEARCH))
         self.assertEqual((result.returncode, found["candidates"][0]["protocol"], found["complete"]), (0, "tformat", True))
         self.assertEqual(found["candidates"][0]["identity"], {})
-        note = "tformat: not known who it is: encoder-id could not be read: the encoder did not answer"
+        note = ("tformat: not known who it is: encoder-id could not be read: the encoder did not answer; "
+                "`absenc info` tries it again")
         self.assertEqual(found["notes"], [note])
         self.assertIn(f"note: {note}\n", result.stderr)
 

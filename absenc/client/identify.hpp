@@ -34,7 +34,8 @@ struct FoundEncoder {
 /// Result of `identify` and `identify_capture`: the encoders that explain the received or captured frames.
 struct Identified {
   std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
-  /// Sentences about protocols that could not be tried, damaged data, and identities that contradict the options.
+  /// Sentences about protocols that could not be tried, damaged data, identities that could not be read, and identities
+  /// that contradict the options.
   std::vector<std::string> notes{};
   bool is_complete = true;  ///< False if the time limit ended the search early.
 };

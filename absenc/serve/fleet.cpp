@@ -154,13 +154,12 @@ Fleet::Reloaded Fleet::change_to(const std::vector<Configured>& all) {
       next.push_back(*same);
       continue;
     }
-    if (os::interrupted()) continue;
-    // New encoders with the same rate of readings are read at different times, spread over one period.
-    const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
-    if (changes.failure) {
+    if (changes.failure || os::interrupted()) {
       changes.left_out.push_back(now.name);
       continue;
     }
+    // New encoders with the same rate of readings are read at different times, spread over one period.
+    const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
     try {
       next.push_back({now.description, start(now, Time(static_cast<std::int64_t>(1e9 * share)), next.size())});
       changes.begun.push_back(now.name);

@@ -47,6 +47,7 @@ class Fleet {
     std::string description;
     std::shared_ptr<Watch> watch;
   };
+  /// Changes of the served encoders, by their names.
   struct Reloaded {
     std::size_t unchanged = 0;
     std::vector<std::string> ended{};

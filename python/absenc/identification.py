@@ -26,7 +26,7 @@ class Identified(NamedTuple):
     """Result of `identify`."""
 
     found: list[Found]  #: most likely first
-    notes: list[str]  #: attempts that were not possible
+    notes: list[str]  #: attempts that were not possible, and identities that could not be read
     is_complete: bool  #: False: `limit_s` expired before all attempts
 
 

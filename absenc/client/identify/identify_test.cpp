@@ -231,7 +231,8 @@ TEST(Identify, SaysWhatOfTheIdentityCouldNotBeReadAndWhy) {
     const LineFindings findings = found_with(place, [&] { place.encoder.device.faults = {fault}; });
     ASSERT_FALSE(findings.candidates.empty());
     EXPECT_TRUE(findings.candidates.front().identity.columns.empty());
-    const std::string note = fmt::format("tformat: not known who it is: encoder-id could not be read: {}", reason);
+    const std::string note = fmt::format(
+        "tformat: not known who it is: encoder-id could not be read: {}; `absenc info` tries it again", reason);
     EXPECT_THAT(findings.notes, Contains(note));
   }
 }
@@ -242,7 +243,7 @@ TEST(Identify, SaysWhoWasNotAskedWhenTheTimeWasOver) {
   EXPECT_TRUE(findings.out_of_time);
   ASSERT_FALSE(findings.candidates.empty());
   EXPECT_TRUE(findings.candidates.front().identity.columns.empty());
-  EXPECT_THAT(findings.notes, Contains("not asked who it is: tformat: the time is over"));
+  EXPECT_THAT(findings.notes, Contains("not asked who it is: tformat: the time is over; `absenc info` asks it"));
 }
 
 }  // namespace

@@ -134,8 +134,9 @@ class Search {
   void note_who_was_not_asked() {
     for (const Candidate& one : findings_.candidates) {
       if (!is_to_be_asked(one) || find_role(one.unit->fields, Role::identity) == nullptr) continue;
-      asked_.emplace(one.unit, one.encoder);
-      findings_.notes.push_back(fmt::format("not asked who it is: {}: the time is over", one.unit->id));
+      asked_.emplace(one.unit, one.encoder);  // one note for all candidates of an encoder
+      findings_.notes.push_back(
+          fmt::format("not asked who it is: {}: the time is over; `absenc info` asks it", one.unit->id));
     }
   }
 
@@ -155,13 +156,14 @@ class Search {
   // another candidate; otherwise adds a note if the identity contradicts the likeliest candidate. Adds a note for each
   // part of the identity that could not be read with the options of the likeliest candidate.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
+    for (const std::string& one : said.front().unread) {
+      const Unit& unit = *findings_.candidates[alike.front()].unit;
+      findings_.notes.push_back(fmt::format("{}: not known who it is: {}; `absenc info` tries it again", unit.id, one));
+    }
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {
       Candidate& candidate = findings_.candidates[alike[i]];
       candidate.identity = said[i].identity;
-      for (const std::string& one : i == 0 ? said[i].unread : std::vector<std::string>()) {
-        findings_.notes.push_back(fmt::format("{}: not known who it is: {}", candidate.unit->id, one));
-      }
       if (said[i].contradiction.empty()) continue;
       if (known) {
         candidate.unit = nullptr;

@@ -39,7 +39,8 @@ struct LineFindings {
   std::size_t searches = 0;
   bool only_echo = false;         // whether in some conversation nothing but the adapter's echo was received
   std::set<std::string> lines{};  // the kinds of lines that were tried, in words
-  // sentences about protocols that could not be tried, and about identities that contradict the options
+  // sentences about protocols that could not be tried, and about identities that could not be read or that contradict
+  // the options
   std::vector<std::string> notes;
   bool out_of_time = false;
   bool interrupted = false;

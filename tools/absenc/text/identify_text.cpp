@@ -162,13 +162,13 @@ std::string decode_command(const Candidate& candidate) {
   return text;
 }
 
-int show_candidates(std::span<const Candidate> candidates, const LeftOpen& open,
+int show_candidates(std::span<const Candidate> candidates, const SearchNotes& search,
                     const std::function<std::string(const Candidate&)>& command, bool json) {
   const bool found = !candidates.empty() && is_found(candidates.front());
   if (json) {
     const Json list = Json::list(candidates, [&](const Candidate& one) { return to_json(one, command(one)); });
     Json result = Json::object().set("ok", found).set("candidates", list);
-    print_line(result.set("notes", Json::list(open.notes)).set("complete", open.is_complete).line());
+    print_line(result.set("notes", Json::list(search.notes)).set("complete", search.is_complete).line());
     return found ? exit_good : exit_failed;
   }
   if (candidates.empty()) return exit_failed;

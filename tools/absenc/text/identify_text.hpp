@@ -22,15 +22,15 @@ using namespace client;
 /// Returns the command that decodes a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// What a search leaves open.
-struct LeftOpen {
-  std::vector<std::string> notes{};  // sentences about what could not be tried or read, and what is damaged
+/// Notes of a search, and whether it was complete.
+struct SearchNotes {
+  std::vector<std::string> notes{};  // sentences about protocols and data that could not be tried or read
   bool is_complete = true;           // false: the search was ended before everything was tried
 };
 
-/// Prints the candidates of a search; as JSON also what the search leaves open. Returns exit_good only if the first
+/// Prints the candidates of a search; as JSON also its notes. Returns exit_good only if the first
 /// candidate cannot be explained by chance.
-int show_candidates(std::span<const Candidate> candidates, const LeftOpen& open,
+int show_candidates(std::span<const Candidate> candidates, const SearchNotes& search,
                     const std::function<std::string(const Candidate&)>& command, bool json);
 
 }  // namespace absenc::tool

@@ -109,8 +109,8 @@ int identify_line(const Invocation& invocation) {
   progress.clear();
   for (const std::string& note : findings.notes) print_message(fmt::format("note: {}", note));
   const auto command = [&](const Candidate& candidate) { return read_command(candidate, search.place); };
-  const LeftOpen open{findings.notes, !findings.interrupted && !findings.out_of_time};
-  const int status = show_candidates(findings.candidates, open, command, invocation.has("--json"));
+  const SearchNotes notes{findings.notes, !findings.interrupted && !findings.out_of_time};
+  const int status = show_candidates(findings.candidates, notes, command, invocation.has("--json"));
   if (findings.interrupted) print_message("interrupted: not everything was tried");
   if (findings.out_of_time) print_message("the time is over, and not everything was tried: give more with --for");
   if (findings.candidates.empty() && !findings.interrupted) print_message(advice_for(findings, search));
@@ -132,10 +132,11 @@ int identify_capture(const Invocation& invocation) {
     if (choices.how.baud > 0) text += fmt::format(" --baud {}", choices.how.baud);
     return invocation.has("--parity") ? text + fmt::format(" --parity {}", invocation.text("--parity")) : text;
   };
-  const int status = show_candidates(findings.candidates, {findings.damages}, command, invocation.has("--json"));
-  for (const std::string& damage : findings.damages) print_message(fmt::format("note: {}", damage));
+  std::vector<std::string> notes = findings.damages;
+  if (findings.candidates.empty()) notes.insert(notes.end(), findings.refusals.begin(), findings.refusals.end());
+  const int status = show_candidates(findings.candidates, {notes}, command, invocation.has("--json"));
+  for (const std::string& note : notes) print_message(fmt::format("note: {}", note));
   if (findings.candidates.empty()) {
-    for (const std::string& refusal : findings.refusals) print_message(fmt::format("note: {}", refusal));
     print_message(
         "no protocol explains anything in the capture\n"
         "  Try: which channel is which wire, with --channel; --baud; a capture with at least four samples a bit");
