@@ -2,6 +2,8 @@
 // For the tests of ESL: virtual QS35 encoders and a host on one line in virtual time.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/esl/device.hpp"
 #include "absenc/protocol/esl/unit.hpp"
@@ -43,6 +45,13 @@ struct Bench : author::testing::UnitBench<24> {
   Reply read(DataId id = DataId::position) {
     const Wire bytes = raw(Request{id});
     return decode_reply(profile, {id, profile.address}, bytes).value();
+  }
+  /// Sends the request of a reset `times` times, as often as the encoder needs by default.
+  void reset(DataId id, unsigned times = reset_requests) {
+    for (unsigned i = 0; i < times; ++i) {
+      EXPECT_EQ(raw(Request{id}).size(), reply_length(id));
+      pass(reset_interval);
+    }
   }
 
   Profile profile;

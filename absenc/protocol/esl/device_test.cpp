@@ -22,13 +22,6 @@ Wire memory_reply(const Request& request, bool busy, std::uint8_t value) {
   return wire(Reply{.id = request.id, .memory_address = request.memory_address, .busy = busy, .value = value});
 }
 
-void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
-  for (unsigned i = 0; i < times; ++i) {
-    EXPECT_EQ(bench.raw(Request{id}).size(), reply_length(id));
-    bench.pass(reset_interval);
-  }
-}
-
 TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   Bench bench;
   testing::RawHost host(wire(hex<"0875">), 5us);
@@ -267,7 +260,7 @@ TEST(EslDevice, ReportsRulesThatAreNoViolations) {
   bench.raw(memory_write(6, 1));
   EXPECT_EQ(broken.rules, Rules{"memory written less than 6 ms after the write before"});
   broken.rules.clear();
-  reset(bench, DataId::zero, reset_requests - 1);
+  bench.reset(DataId::zero, reset_requests - 1);
   bench.raw(Request{DataId::temperature});
   EXPECT_EQ(broken.rules, Rules{"reset not sent eight times in a row"});
 }
@@ -318,117 +311,7 @@ TEST(EslDevice, EachAddressHasItsOwnByte) {
   EXPECT_EQ(seen.size(), 6u * 127 + 12 + 48 + 64);
 }
 
-// ---- Alarms (Table 8)
-
-TEST(EslDevice, AlarmsAreClearedAsInTable8) {
-  struct Row {
-    std::uint8_t alarm;
-    bool by_c;
-    bool by_d_and_c;
-    bool by_power;
-  };
-  for (const Row& row :
-       {Row{alarms::xc_error, true, true, false}, Row{alarms::multiturn_error, false, true, false},
-        Row{alarms::led_or_lissajous_error, false, false, true}, Row{alarms::overspeed, false, false, true},
-        Row{alarms::memory_error, false, false, true}, Row{alarms::singleturn_error, false, false, true},
-        Row{alarms::under_voltage, false, false, false}, Row{alarms::over_voltage, false, false, false}}) {
-    Bench bench;
-    bench.encoder.raise_alarms(row.alarm);
-    EXPECT_EQ(bench.read().one.alarms, row.alarm);
-    EXPECT_EQ(bench.read().two.alarms, row.alarm);
-    reset(bench, DataId::clear_alarms, 7);
-    EXPECT_EQ(bench.read().one.alarms, row.alarm);
-    reset(bench, DataId::clear_alarms);
-    EXPECT_EQ(bench.read().one.alarms == 0, row.by_c) << int{row.alarm};
-    reset(bench, DataId::reset_multiturn);
-    bench.pass(10ms);
-    reset(bench, DataId::clear_alarms);
-    EXPECT_EQ(bench.read().one.alarms == 0, row.by_d_and_c) << int{row.alarm};
-    if (row.by_c || row.by_d_and_c) continue;
-    bench.restart();
-    EXPECT_EQ(bench.read().one.alarms == 0, row.by_power) << int{row.alarm};
-    bench.encoder.lower_alarms(row.alarm);
-    EXPECT_EQ(bench.read().one.alarms, 0);
-  }
-}
-
-// Table 8 on clearing the alarm multiturn_error: "perform MT counter reset and all error clear".
-TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
-  Bench bench;
-  reset(bench, DataId::reset_multiturn);
-  bench.pass(10ms);
-  bench.encoder.raise_alarms(alarms::multiturn_error);
-  reset(bench, DataId::clear_alarms);
-  EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
-  reset(bench, DataId::reset_multiturn);
-  bench.pass(10ms);
-  // The alarm multiturn_error was raised already when the turns were reset, so raising it again here changes nothing.
-  bench.encoder.raise_alarms(alarms::multiturn_error);
-  reset(bench, DataId::clear_alarms);
-  EXPECT_EQ(bench.read().one.alarms, 0);
-}
-
-TEST(EslDevice, PowerCycleLeavesTurnAlarms) {
-  Bench bench;
-  bench.encoder.raise_alarms(alarms::turns_wrong | alarms::overspeed | alarms::memory_error);
-  for (unsigned i = 0; i < 5; ++i) bench.read();
-  bench.restart();
-  const Reply reply = bench.read();
-  EXPECT_EQ(reply.one.alarms, alarms::turns_wrong);
-  EXPECT_EQ(reply.one.sequence, 1);
-}
-
-TEST(EslDevice, SupplySpeedAndTemperature) {
-  Bench bench;
-  for (const auto& [index, value, alarms, status] :
-       {std::tuple{condition::supply_voltage, 2900, 0, status::ready + 0},
-        std::tuple{condition::supply_voltage, 2899, alarms::under_voltage + 0, status::ready | status::safety_error},
-        std::tuple{condition::supply_voltage, 3700, 0, status::ready + 0},
-        std::tuple{condition::supply_voltage, 3701, alarms::over_voltage + 0, status::ready | status::safety_error},
-        std::tuple{condition::temperature, 105, 0, status::ready + 0},
-        std::tuple{condition::temperature, 106, 0, status::ready | status::temperature_warning}}) {
-    bench.condition(index, value);
-    EXPECT_EQ(bench.read().one.alarms, alarms) << value;
-    EXPECT_EQ(bench.read().one.status, status) << value;
-    bench.condition(index, conditions[index].normal);
-  }
-  bench.condition(condition::temperature, -10);
-  EXPECT_EQ(bench.run("temperature").numbers.at("temperature_c"), -10);
-  bench.shaft.spin(10'000, bench.line.now());
-  EXPECT_EQ(bench.read(DataId::alarms).one.alarms, 0);
-  bench.shaft.spin(-10'001, bench.line.now());
-  bench.read(DataId::alarms);
-  bench.shaft.spin(0, bench.line.now());
-  EXPECT_EQ(bench.read(DataId::alarms).one.alarms, alarms::overspeed);
-  EXPECT_EQ(bench.read(DataId::alarms).one.status, status::ready | status::non_safety_error);
-}
-
-// ---- Resets
-
-TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
-  Bench bench;
-  bench.shaft.put(3, 1'000'000);
-  reset(bench, DataId::zero, 7);
-  bench.raw(Request{DataId::temperature});
-  reset(bench, DataId::zero, 1);
-  EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  // these eight requests of a reset follow each other after less than 35 us
-  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});
-  EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  EXPECT_GT(bench.violations(), 0u);
-  reset(bench, DataId::zero);
-  EXPECT_EQ(bench.read().singleturn, 0u);
-  EXPECT_EQ(bench.read().redundant, 0u);
-  EXPECT_EQ(bench.read().multiturn, 3u);
-}
-
-TEST(EslDevice, ResetOnATurningShaftIsAViolation) {
-  Bench bench;
-  bench.shaft.spin(5, Time{});
-  reset(bench, DataId::reset_multiturn);
-  ASSERT_EQ(bench.violations(), 1u);
-  EXPECT_EQ(bench.encoder.violations()[0].rule, "reset while the shaft turns");
-}
+// ---- Channels and damage
 
 TEST(EslDevice, FaultsStayInTheirChannel) {
   Bench bench;
