@@ -13,8 +13,6 @@
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/core/crc.hpp"
-#include "absenc/os/linux/fake_spi_test.hpp"
-#include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
 
@@ -22,7 +20,6 @@ using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
-using testing::IsEmpty;
 
 namespace {
 
@@ -419,36 +416,6 @@ TEST(Doctor, PositionsOfAnAskedResolutionAreNotDamaged) {
   EXPECT_EQ(ids(examination), (std::vector<std::string>{"clock_range", "alarm", "alarm"})) << examination.verdict();
 }
 
-// ---- Healthy encoders
-
-TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
-  std::mt19937_64 random(16);
-  std::size_t runs = 0;
-  while (runs < 1000) {
-    for (const Unit* unit : all_units()) {
-      if (find_command(*unit, Verb::read) == nullptr) continue;
-      const std::uint64_t seed = random();
-      const std::string motion = seed % 2 == 0 ? "" : "?motion=rpm=" + std::to_string(seed % 97);
-      const EncoderAddress address = parse_address("sim:" + std::string(unit->id) + motion);
-      const Surroundings surroundings{[seed](const EncoderAddress& to) { return virtual_link(to, {.pauses = seed}); },
-                                      [](const std::string&) { return os::PortFacts{}; }};
-      const Examination examination = examine(address, {.readings = 60, .limit = 30s}, surroundings);
-      EXPECT_THAT(ids(examination), IsEmpty())
-          << unit->id << motion << " seed " << seed << ": " << examination.verdict();
-      EXPECT_TRUE(examination.healthy());
-      EXPECT_GT(examination.good, 20u) << unit->id;
-      if (++runs % 100 == 0 && testing::Test::HasFailure()) return;
-    }
-  }
-}
-
-/// A flicker of the position by one count is no noise; neither is an even or an accelerated motion.
-TEST(Doctor, AFlickeringLastBitIsNoNoise) {
-  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
-  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
-  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
-}
-
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {
@@ -465,27 +432,6 @@ TEST(Doctor, EndsAsSoonAsItIsToldTo) {
       EXPECT_LE(asked, when + 2) << "it goes on";
     }
   }
-}
-
-// ---- SPI, with the settings of the kernel's driver
-
-TEST(Doctor, TheModeOfAnSpiControllerIsFoundOnItsWires) {
-  os::testing::FakeSpi kernel;
-  EncoderAddress address = parse_address("encolink-spi:spi:/dev/spidev0.0?spi_mode=0");
-  VirtualDevice device(*address.unit, address.options, {});
-  device.power_on(os::now());
-  LineSettings right = address.line;
-  kernel.connect(address.unit->link, right, *device.bytes());
-  const Surroundings surroundings{[&](const EncoderAddress& to) {
-    const auto port = std::make_shared<os::SpiPort>(to.path, to.unit->link, to.line, to.spi, kernel);
-    Link link;
-    link.bytes = port.get();
-    link.owner = port;
-    return link;
-  }};
-  const Examination wrong = examine(address, {.readings = 20}, surroundings);
-  ASSERT_THAT(ids(wrong), Contains("wrong_spi_mode"));
-  EXPECT_EQ(wrong.findings.at(0).action, "set spi_mode=" + std::to_string(right.spi_mode));
 }
 
 }  // namespace absenc::client

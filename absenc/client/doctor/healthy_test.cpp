@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks that healthy encoders get no warning and no fault.
 #include <fmt/format.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/modes_test.hpp"
+#include "absenc/client/doctor/observed_test.hpp"
 #include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/random.hpp"
@@ -19,6 +22,7 @@ namespace absenc::client {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::IsEmpty;
 
 constexpr unsigned examinations = 200;  // number of examinations with the encoder in each mode
 constexpr std::size_t readings = 40;
@@ -93,6 +97,34 @@ std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
 
 INSTANTIATE_TEST_SUITE_P(Units, HealthyEncoder, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          name_of_test);
+
+TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
+  std::mt19937_64 random(16);
+  std::size_t runs = 0;
+  while (runs < 1000) {
+    for (const Unit* unit : all_units()) {
+      if (find_command(*unit, Verb::read) == nullptr) continue;
+      const std::uint64_t seed = random();
+      const std::string motion = seed % 2 == 0 ? "" : "?motion=rpm=" + std::to_string(seed % 97);
+      const EncoderAddress address = parse_address("sim:" + std::string(unit->id) + motion);
+      const Surroundings surroundings{[seed](const EncoderAddress& to) { return virtual_link(to, {.pauses = seed}); },
+                                      [](const std::string&) { return os::PortFacts{}; }};
+      const Examination examination = examine(address, {.readings = 60, .limit = 30s}, surroundings);
+      EXPECT_THAT(ids(examination), IsEmpty())
+          << unit->id << motion << " seed " << seed << ": " << examination.verdict();
+      EXPECT_TRUE(examination.healthy());
+      EXPECT_GT(examination.good, 20u) << unit->id;
+      if (++runs % 100 == 0 && testing::Test::HasFailure()) return;
+    }
+  }
+}
+
+/// A flicker of the position by one count is no noise; neither is an even or an accelerated motion.
+TEST(Doctor, AFlickeringLastBitIsNoNoise) {
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
+}
 
 }  // namespace
 }  // namespace absenc::client
