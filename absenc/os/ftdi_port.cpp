@@ -265,6 +265,15 @@ void FtdiPort::send(std::size_t clocks, TransferResult* received) {
 }
 
 FtdiPort::DataPin FtdiPort::look_at_data() {
+  const DataPin first = look_once();
+  if (first.driven) return first;
+  // An encoder that ends its timeout changes the level by itself. If it did so between the two reads of the pin, the
+  // second look finds the pin driven.
+  const DataPin second = look_once();
+  return second.driven ? second : first;
+}
+
+FtdiPort::DataPin FtdiPort::look_once() {
   commands_.clear();
   commands_.read_pins();
   send(0);

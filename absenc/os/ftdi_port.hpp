@@ -48,6 +48,7 @@ class FtdiPort final : public TransferPort {
 
  private:
   void exchange(const Step<std::uint8_t>& step, TransferResult& received) override;
+  [[nodiscard]] DataPin look_once();
   [[nodiscard]] std::uint32_t set_rate() const override { return settings_.rate; }
   void change_rate(std::uint32_t rate) override;
 
