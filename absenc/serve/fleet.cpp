@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <new>
 #include <system_error>
 #include <unordered_set>
@@ -22,6 +23,11 @@ namespace absenc::serve {
 using namespace client;
 
 namespace {
+
+// An encoder begins only if this much memory is left, in bytes: the reading threads and the server's answers need some
+// at any time. So much does not fit into the addresses that glibc has reserved for a heap, from which no thread gets a
+// stack.
+constexpr std::size_t memory_to_spare = std::size_t{64} << 20;
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
@@ -103,6 +109,7 @@ std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std:
                     encoder.name, others, reason));
   };
   try {
+    ::operator delete(::operator new(memory_to_spare));
     return std::make_shared<Watch>(encoder.name, encoder.address, encoder.rate, offset, *server_events_);
   } catch (const std::system_error& error) {
     throw failure(fmt::format("thread: {}", error.code().message()));
