@@ -25,9 +25,9 @@ using namespace client;
 namespace {
 
 // An encoder begins only if this much memory is left, in bytes: the reading threads and the server's answers need some
-// at any time. So much does not fit into the addresses that glibc has reserved for a heap, from which no thread gets a
-// stack.
-constexpr std::size_t memory_to_spare = std::size_t{64} << 20;
+// at any time. It is more than fits into the addresses that glibc has already reserved for a heap, from which no thread
+// gets a stack: 64 MiB, on a machine of 32 bits 1 MiB.
+constexpr std::size_t memory_to_spare = std::size_t{sizeof(void*) == 8 ? 64 : 2} << 20;
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
