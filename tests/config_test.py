@@ -166,14 +166,14 @@ class ManyEncoders(ConfigCase):
         """The processor time must not grow with the square of the number of encoders."""
         self.assertLess(self.processor_time(2000), 30 * max(self.processor_time(200), 0.01))
 
-    def served(self, gigabytes, *shell):
-        """Starts the server, by the command `shell` if given, with at most this many gigabytes of addresses.
+    def served(self, megabytes, *shell):
+        """Starts the server, by the command `shell` if given, with at most this many megabytes of addresses.
 
         glibc reserves 64 MiB of them for each of up to 8 heaps per core, on a machine of 32 bits only 1 MiB. With two
         heaps, the threads have equally many however many cores the machine has."""
         def limit():
             if not os.environ.get("ABSENC_IN_QEMU"):  # qemu needs more, and gives an emulated machine of 32 bits 4 GB
-                resource.setrlimit(resource.RLIMIT_AS, (int(gigabytes * 2**30),) * 2)
+                resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20,) * 2)
 
         environment = {**os.environ, "HOME": self.home, "XDG_STATE_HOME": self.home, "MALLOC_ARENA_MAX": "2"}
         environment.pop("ABSENC_CONFIG", None)
@@ -186,7 +186,7 @@ class ManyEncoders(ConfigCase):
     def test_serve_with_many_encoders_ends_by_signal(self):
         """The server has as many addresses as on a machine of 32 bits."""
         self.many(range(1000))
-        process = self.served(3)
+        process = self.served(3072)
         self.assertIn(b"http://", process.stdout.readline())
         self.assertEqual(end(process)[0], 0)
 
@@ -196,7 +196,7 @@ class ManyEncoders(ConfigCase):
         self.many(range(1000))
         for megabytes in range(200, 900, 25):
             with self.subTest(megabytes):
-                process = self.served(megabytes / 1024)
+                process = self.served(megabytes)
                 said = read_line(process.stderr, time.monotonic() + PATIENCE)
                 self.assertRegex(said, CANNOT_BEGIN + "(memory|thread)")
                 self.assertIn("ulimit", said)
@@ -212,9 +212,10 @@ class ManyEncoders(ConfigCase):
             shell = ["setpriv", f"--reuid={user}", "--clear-groups", *may_open]
         find = ["find", "/proc", "-mindepth", "3", "-maxdepth", "3", "-path", "*/task/*", "-uid", str(user)]
         threads = subprocess.run(find, capture_output=True, check=False).stdout.count(b"\n")
-        process = self.served(3, *shell, "prlimit", f"--nproc={threads + 100}")
+        process = self.served(3072, *shell, "prlimit", f"--nproc={threads + 100}")
         said = read_line(process.stderr, time.monotonic() + PATIENCE)
         self.assertRegex(said, CANNOT_BEGIN + "thread")
+        self.assertIn("ulimit", said)
         self.assertEqual(process.wait(PATIENCE), 1)
 
     @unittest.skipIf(os.environ.get("ABSENC_IN_QEMU"), "qemu needs more addresses than the test leaves")
@@ -233,7 +234,7 @@ class ManyEncoders(ConfigCase):
                 return {one["encoder"] for one in json.load(reply)["encoders"]}
 
         self.many(range(3))
-        process = self.served(0.75)
+        process = self.served(768)
         url = re.search(r"http://[0-9.:]+/", process.stdout.readline().decode())[0]
         said = reload(range(1000))
         begun, left_out = re.search(r"3 unchanged; ended: none; begun: (.*); not begun: (.*): axis", said).groups()

@@ -26,7 +26,7 @@ namespace {
 
 // An encoder begins only if this much memory is left, in bytes: the reading threads and the server's answers need some
 // at any time. It is more than fits into the addresses that glibc has already reserved for a heap, from which no thread
-// gets a stack: 64 MiB, on a machine of 32 bits 1 MiB.
+// gets a stack: 64 MiB, on a machine of 32 bits 1 MiB, where addresses are too few to ask for more.
 constexpr std::size_t memory_to_spare = std::size_t{sizeof(void*) == 8 ? 64 : 2} << 20;
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
@@ -109,7 +109,7 @@ std::shared_ptr<Watch> Fleet::start(const Configured& encoder, Time offset, std:
                     encoder.name, others, reason));
   };
   try {
-    ::operator delete(::operator new(memory_to_spare));
+    ::operator delete(::operator new(memory_to_spare));  // the compiler may leave out a `new` of memory without use
     return std::make_shared<Watch>(encoder.name, encoder.address, encoder.rate, offset, *server_events_);
   } catch (const std::system_error& error) {
     throw failure(fmt::format("thread: {}", error.code().message()));

@@ -28,8 +28,8 @@ struct SearchNotes {
   bool is_complete = true;           // false: the search was ended before everything was tried
 };
 
-/// Prints the candidates of a search; as JSON also its notes. Returns exit_good only if the first
-/// candidate cannot be explained by chance.
+/// Prints the candidates of a search; as JSON also its notes. Returns exit_good only if the first candidate cannot be
+/// explained by chance.
 int show_candidates(std::span<const Candidate> candidates, const SearchNotes& search,
                     const std::function<std::string(const Candidate&)>& command, bool json);
 
